@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).parents[1]
 # a worker for every core has no core for more threads, which wait for each other at full speed;
@@ -17,6 +18,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "benchmarks" / "sources")]
 
 from opamc_cli.__main__ import main  # noqa: E402
+
+# how long an example takes says how busy the machine is
+settings.register_profile("untimed", settings(), deadline=None)
+settings.load_profile("untimed")
 
 Made = Callable[[str, Callable[[Path], object]], Path]
 

@@ -35,14 +35,14 @@ TREES = st.recursive(
 @given(TREES, st.booleans())
 @example("1E5", False)
 @example({"robot": "0e0", "limit": 1e5, "share": 1e-05, "offset": -1.0}, True)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_yaml_reads_back_what_was_written(tree, flow):
     text = yaml_of(tree, default_flow_style=flow, allow_unicode=True)
     assert plain_values(text) == tree
 
 
 @given(st.text(max_size=60) | st.text("[]{}:,-&*!?|>'\"#%@ \nab1.e", max_size=60))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_any_text_is_yaml_or_is_refused(text):
     said = ""
     with contextlib.suppress(YamlError):
@@ -95,7 +95,7 @@ def test_odd_run_metadata(values, said):
         payload_kg=st.none() | st.floats(0.0, 1e6),
     )
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_run_metadata_reads_back(info):
     assert RunInfo(**parsed(RunMetadata, info.to_json().encode(), "", "").model_dump()) == info
 

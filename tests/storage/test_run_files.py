@@ -20,7 +20,7 @@ def noise(n, seed=0):
     return np.random.default_rng(seed).normal(size=n).astype(np.float32)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     n=st.integers(1, 400),
     group=st.integers(1, 100),

@@ -12,7 +12,7 @@ windups = st.floats(-3e-3, 3e-3)
 
 
 @given(angles, st.floats(0.1, 1.5), st.floats(0.05, 0.8))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_share_is_periodic_bounded_and_its_slope_its_derivative(
     angle: float, sector: float, zone: float
 ) -> None:
@@ -41,7 +41,7 @@ def _energy(windup: float, half_play: float, closing: float, weight: float) -> f
 
 
 @given(windups, st.floats(0.0, 8e-4), st.floats(0.0, 0.5))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_torques_are_derivatives_of_the_energy(
     windup: float, half_play: float, closing: float
 ) -> None:
@@ -60,7 +60,7 @@ def test_torques_are_derivatives_of_the_energy(
 
 
 @given(windups, st.floats(0.0, 8e-4))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_play_never_adds_torque_and_torque_opposes(windup: float, half_play: float) -> None:
     loose = zone_torque(windup, half_play, 0.0, 0.5, 1.6e4, 1e9)[0]
     tight = zone_torque(windup, 0.0, 0.0, 0.5, 1.6e4, 1e9)[0]

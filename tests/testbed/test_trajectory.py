@@ -9,7 +9,7 @@ positive = st.floats(0.05, 50.0)
 
 
 @given(st.floats(-8.0, 8.0), positive, positive, positive)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_move_keeps_its_limits_and_arrives_at_rest(
     distance: float, velocity: float, acceleration: float, jerk: float
 ) -> None:
@@ -25,7 +25,7 @@ def test_a_move_keeps_its_limits_and_arrives_at_rest(
 
 
 @given(st.floats(0.1, 5.0), positive, positive, positive)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_velocity_and_acceleration_are_the_derivatives(
     distance: float, velocity: float, acceleration: float, jerk: float
 ) -> None:

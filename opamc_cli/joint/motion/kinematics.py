@@ -17,6 +17,7 @@ from opamc_cli.signal.motion.smoothing import (
     SHORTEST_WINDOW,
     averaging_kernel,
     blurred,
+    bridged,
     clear_of_corners,
     derivatives,
     filled,
@@ -308,7 +309,7 @@ def _one(
         temperature = None
     others = None
     if beside and logged:
-        paths = [filled(recording.others_rad[axis]) for axis in beside]
+        paths = [bridged(recording.others_rad[axis], rate) for axis in beside]
         others = np.stack(
             [derivatives(path, rate, motion.window, order) for order in range(3) for path in paths]
         ).T
@@ -363,11 +364,12 @@ def _one(
 def _logged_motion(recording: Recording, smoothing: Smoothing | None) -> tuple[Motion, Bools]:
     """Motion of a logged position or, without one, of a logged speed, and where that is known."""
     position, speed = recording.position_rad, recording.velocity_rad_s
+    rate = recording.rate_hz
     if position is None:
         assert speed is not None
-        return motion_from_velocity(filled(speed), recording.rate_hz), np.isfinite(speed)
-    whole = None if speed is None else filled(speed)
-    motion = motion_from_position(filled(position), whole, recording.rate_hz, smoothing)
+        return motion_from_velocity(bridged(speed, rate), rate), np.isfinite(speed)
+    whole = None if speed is None else bridged(speed, rate)
+    motion = motion_from_position(bridged(position, rate), whole, rate, smoothing)
     return motion, np.isfinite(position)
 
 

@@ -22,6 +22,8 @@ samples leave a fifth of the speed as noise, and no direction is certain."""
 QUIET_S = 0.05
 """Longest window by which an acceleration is quietened: at 100 Hz, where nine samples are 90 ms, an
 arm that rings and ripples lost more than the noise (testbed, 590000: 0.924 A, 0.888 without)."""
+BESIDE_S = 0.02
+"""Of a path beside a gap, by which it is told how fast the path is there."""
 LATE_SHARE = 0.1
 """Of what a logged speed differs by from the position's, that its lag must explain: a stranger's 71
 filtered speeds 0.2 or more; of 20 measured joints, which show none, 0.03 at most."""
@@ -222,6 +224,31 @@ def filled(values: Floats) -> Floats:
         return values
     indices = np.arange(values.size)
     return np.interp(indices, indices[good], values[good])
+
+
+def bridged(path: Floats, rate_hz: float) -> Floats:
+    """Path, (n,), with gaps bridged by cubics as fast at their ends as the path is there.
+
+    A straight line would begin and end by blows, of which a joint that rings says nothing.
+    Unchanged if all values are finite.
+    """
+    whole = filled(path)
+    good = np.isfinite(path)
+    if good.all() or not good.any():
+        return whole
+    beside = max(round(BESIDE_S * rate_hz), SHORTEST_WINDOW)
+    ends = np.flatnonzero(np.diff(good.astype(np.int8), prepend=1, append=1)).reshape(-1, 2)
+    for first, last in ends.tolist():
+        before, after = whole[max(first - beside, 0) : first], whole[last : last + beside]
+        if min(before.size, after.size) < SHORTEST_WINDOW:
+            continue
+        way, n = after[0] - before[-1], last - first + 1
+        # parabolas, from the gap outwards
+        starts = -n * np.polyfit(np.arange(before.size), before[::-1], 2)[1] - way
+        stops = n * np.polyfit(np.arange(after.size), after, 2)[1] - way
+        t = np.arange(1, n) / n
+        whole[first:last] += t * (1 - t) * ((1 - t) * starts - t * stops)
+    return whole
 
 
 def unstepped(values: Floats) -> Floats:

@@ -32,8 +32,8 @@ from opamc_cli.stages.chain.cycles.axis import (
     axes_of,
     match_rule,
     span_at,
+    usable_segments,
     values_of,
-    whole_segments,
 )
 from opamc_cli.stages.chain.cycles.lags import lags_to
 from opamc_cli.stages.chain.cycles.leads import with_leads
@@ -42,7 +42,6 @@ from opamc_cli.stages.chain.cycles.reference import (
     Reference,
     given_references,
     own_references,
-    usable_segments,
     with_carrier,
 )
 from opamc_cli.stages.processes.kept import KeptResults, remembered
@@ -328,7 +327,7 @@ def _identify_part(job: _Job) -> pa.Table:
     f_max_hz = np.full(n, np.nan)
     samples = np.zeros(n, dtype=np.int64)
     is_reference = np.zeros(n, dtype=bool)
-    whole = whole_segments(part) if reference is None else usable_segments(part, reference)
+    whole = usable_segments(part, reference is not None and reference.edges)
     if reference is not None and whole.size:
         rule, own = match_rule(job.config), part.features.take(whole)
         found = _identified(reference.features, own, rule)

@@ -13,7 +13,7 @@ from opamc_cli.decision.divergence.features import compare, ks_statistic
 samples = st.lists(st.sampled_from([0.0, 0.1, 0.1, 0.25, 0.5, 0.9]), min_size=1, max_size=12)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(samples, samples)
 def test_ks_statistic_is_scipys_with_ties(baseline, target):
     with np.errstate(divide="ignore"):  # Its p value, of one session; not asked here.

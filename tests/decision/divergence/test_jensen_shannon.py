@@ -22,7 +22,7 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 counts = arrays(np.int64, 24, elements=st.integers(0, 50)).filter(lambda c: c.sum() > 0)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(counts, counts, st.sampled_from([2.0, math.e, 10.0]))
 def test_jensen_shannon_is_scipys_distance_squared(p, q, base):
     ours = jensen_shannon(p, q, base)

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from opamc_cli.decision.significance.multiplicity import harmonic_mean, holm
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=7), st.floats(0.001, 0.2))
 def test_holm_rejects_what_its_step_down_definition_rejects(p, level):
     adjusted = holm(p)

@@ -18,7 +18,7 @@ from opamc_cli.decision.significance.spread import (
 )
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=9), st.floats(-5, 5))
 def test_a_spliced_p_value_lies_in_its_rank_step(reference, observed):
     p = spliced_p_value(reference, observed, Spread(1.0, 4.0))

@@ -142,7 +142,7 @@ def test_every_effect_is_a_fault_or_not_as_the_documentation_says(name):
     assert state == ("`changed`" if effect.origin != "joint" else "`fault`")
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.lists(st.sampled_from([-1.0, -0.3, 0.0, 0.2, 0.7, 1.0]), min_size=2, max_size=12))
 def test_dahl_state_solves_its_equation(places):
     position = np.array(places)

@@ -24,7 +24,7 @@ from opamc_cli.joint.motion.track import coarsen
 from opamc_cli.signal.transform.filters import answers
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=80), st.integers(0, 2**32 - 1))
 def test_a_covariate_is_stretched_within_0_and_1_in_its_own_order(values, seed):
     values = np.array(values)

@@ -80,7 +80,7 @@ def drawn(seed, width, units):
 SIZES = (st.integers(0, 10_000), st.integers(1, 4), st.integers(8, 11))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(*SIZES)
 def test_leaving_units_out_equals_refitting(seed, width, units):
     _, parts, columns, signal = drawn(seed, width, units)
@@ -88,7 +88,7 @@ def test_leaving_units_out_equals_refitting(seed, width, units):
     np.testing.assert_allclose(fast, slow_held_out(columns, signal, parts), rtol=1e-6, atol=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(*SIZES)
 def test_collinear_columns_and_empty_ones_change_no_error(seed, width, units):
     _, parts, columns, signal = drawn(seed, width, units)
@@ -114,7 +114,7 @@ def test_a_model_of_nothing_leaves_the_current():
     np.testing.assert_allclose(sums_of(columns[:, :0], signal, parts).held_out(), power)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(*SIZES)
 def test_a_known_regressor_is_taken_out_of_the_current(seed, width, units):
     rng, parts, columns, signal = drawn(seed, width, units)
@@ -125,7 +125,7 @@ def test_a_known_regressor_is_taken_out_of_the_current(seed, width, units):
         np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-7, atol=1e-7)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(*SIZES)
 def test_drift_is_an_offset_for_every_half_of_a_unit(seed, width, units):
     _, parts, columns, signal = drawn(seed, width, units)

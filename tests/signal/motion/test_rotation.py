@@ -40,7 +40,7 @@ def test_noise_adds_nothing_on_the_whole():
     assert angle * 2048 / (2 * np.pi) == pytest.approx(100, rel=0.05)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.integers(0, 70), max_size=8), st.integers(1, 20))
 def test_does_not_depend_on_the_pieces(pieces, step):
     rng = np.random.default_rng(sum(pieces))

@@ -9,6 +9,7 @@ from opamc_cli.signal.motion.smoothing import (
     averaged,
     averaging_kernel,
     block_mean,
+    bridged,
     derivatives,
     filled,
     measurement_noise,
@@ -132,3 +133,31 @@ def test_gaps_are_bridged_by_straight_lines_and_ends_keep_their_value():
     values = np.array([np.nan, 1.0, np.nan, np.inf, 4.0, np.nan])
     np.testing.assert_array_equal(filled(values), [1, 1, 2, 3, 4, 4])
     assert np.isnan(filled(np.full(3, np.nan))).all()
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 2000.0])
+@pytest.mark.parametrize("first_s", [0.0, 0.15, 0.5, 0.85])
+def test_a_gap_in_a_path_is_bridged_without_a_blow(rate_hz, first_s):
+    t = np.clip(np.arange(-1, 2.5, 1 / rate_hz), 0, 1)
+    path = t**3 * (10 - 15 * t + 6 * t**2)
+    first = round((1 + first_s) * rate_hz)
+    gap = slice(first, first + round(0.2 * rate_hz))
+    lacking = path.copy()
+    lacking[gap] = np.nan
+    found = bridged(lacking, rate_hz)
+    known = np.isfinite(lacking)
+    np.testing.assert_array_equal(found[known], path[known])
+    assert np.abs(found - path).max() < np.abs(filled(lacking) - path).max()
+    blow = np.abs(np.diff(found, 2)).max() * rate_hz**2
+    assert blow < 3.5 * np.abs(np.diff(path, 2)).max() * rate_hz**2
+    assert blow < 0.5 * np.abs(np.diff(filled(lacking), 2)).max() * rate_hz**2
+
+
+def test_gaps_of_one_sample_and_at_the_ends_are_bridged_too():
+    path = np.arange(50.0) ** 2
+    lacking = path.copy()
+    lacking[[0, 20, 49]] = np.nan
+    found = bridged(lacking, 100.0)
+    assert found[20] == pytest.approx(400.0)
+    assert (found[0], found[49]) == (1.0, 48.0**2)
+    assert np.isnan(bridged(np.full(3, np.nan), 100.0)).all()

@@ -56,7 +56,7 @@ def series(draw, values):
     return draw(arrays(dtype, n, elements=values))
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(series(awkward_values), st.integers(1, 9))
 def test_counts_equal_sorting(x, tau):
     counts = ordinal_counts(x, range(3, 8), tau)
@@ -66,7 +66,7 @@ def test_counts_equal_sorting(x, tau):
         assert found == {p: n for p, n in expected.items() if n}
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(series(with_gaps), st.integers(1, 6), st.integers(2, 7))
 def test_patterns_that_touch_nan_are_left_out(x, tau, order):
     patterns = sorted_windows(x, order, tau)

@@ -81,7 +81,7 @@ class TestStream:
         stream = AnalyticStream(FS_HZ, 8.0, **options)
         return np.concatenate([stream.push(x), stream.finish()])
 
-    @settings(max_examples=30, deadline=None)
+    @settings(max_examples=30)
     @given(st.lists(st.integers(0, 9000), min_size=1, max_size=6))
     def test_result_does_not_depend_on_the_pieces(self, pieces):
         x = self.carrier(sum(pieces))

@@ -17,7 +17,7 @@ def blocks_of_whole(x, core, overlap):
     return [padded[i * core : (i + 1) * core + 2 * overlap] for i in range(n_blocks)]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     st.lists(st.integers(0, 40), max_size=8),
     st.integers(1, 17),

@@ -24,7 +24,7 @@ def laid(values, kind):
     return np.asfortranarray(longer)[: len(values)] if kind == "part" else np.asfortranarray(values)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 9999), WIDTHS, WIDTHS, *[st.sampled_from(["signals", "samples", "part"])] * 2)
 def test_products_are_sums_over_the_samples_of_a_range(seed, k, m, first, second):
     rng = np.random.default_rng(seed)

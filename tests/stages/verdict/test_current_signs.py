@@ -31,6 +31,7 @@ def measured(folder, name, moves, *, load=0.0, alter=lambda current: current):
     save_run(path, info, columns)
     starts, stops = zip(*spans, strict=True)
     of_run = {"run": [name] * len(spans), "axis": [1] * len(spans), "start": starts, "stop": stops}
+    of_run["edge"] = [False] * len(spans)
     (own,) = measure([RunSource(name, path, "", n, info)], pa.table(of_run))
     return own
 
@@ -106,7 +107,7 @@ def test_beside_a_logged_motion_exchanged_phases_turn_against_it(tmp_path, logge
         columns[f"axis1_{logged}"] = position if logged == "position" else v
         info, path = RunInfo(sampling_rate_hz=RATE_HZ), tmp_path / f"{name}.parquet"
         save_run(path, info, columns)
-        row = {"run": [name], "axis": [1], "start": [0], "stop": [v.size]}
+        row = {"run": [name], "axis": [1], "start": [0], "stop": [v.size], "edge": [False]}
         (own,) = measure([RunSource(name, path, "", v.size, info)], pa.table(row))
         return own
 

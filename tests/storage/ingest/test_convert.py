@@ -14,7 +14,7 @@ from opamc_cli.storage.ingest.map.map_file import IngestMap
 FILE = Path("a.csv")
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     steps=st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=60),
     cut=st.integers(0, 60),

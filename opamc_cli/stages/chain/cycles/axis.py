@@ -50,9 +50,13 @@ def segment_features(rows: pa.Table) -> SegmentFeatures:
     rate = values_of(rows, "sampling_rate_hz")
     pause = np.full(len(start), np.nan)
     pause[1:] = (start[1:] - stop[:-1]) / rate[1:]
+    duration_s = (stop - start) / rate
+    # How long it lasts that a gap has cut is not known: it stays, and no cycle reaches across it.
+    inner = slice(1, -1)
+    duration_s[inner][values_of(rows, "edge")[inner].astype(bool)] = np.nan
     return SegmentFeatures(
         variance=values_of(rows, "variance").astype(np.float64),
-        duration_s=(stop - start) / rate,
+        duration_s=duration_s,
         f_max_hz=values_of(rows, "f_max_hz"),
         direction=values_of(rows, "direction").astype(np.int64),
         pause_s=pause,
@@ -70,5 +74,15 @@ def span_at(rows: pa.Table, index: int) -> tuple[int, int]:
 
 
 def whole_segments(part: Axis) -> npt.NDArray[np.int64]:
-    """Return the indices of the segments that no edge of the recording has cut."""
+    """Return the indices of the segments that no edge of the recording and no gap has cut."""
     return np.flatnonzero(~values_of(part.rows, "edge").astype(bool))
+
+
+def usable_segments(part: Axis, executions: bool) -> npt.NDArray[np.int64]:
+    """Return the indices of the segments in which cycles are looked for.
+
+    The recording's edges have cut none of them, unless each is an execution of the program.
+    """
+    cut = values_of(part.rows, "edge").astype(bool)
+    cut[1:-1] = False
+    return np.arange(cut.size) if executions else np.flatnonzero(~cut)

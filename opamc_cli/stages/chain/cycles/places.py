@@ -15,11 +15,11 @@ from opamc_cli.signal.cycles.identification import (
 from opamc_cli.signal.cycles.reference import MOSTLY
 from opamc_cli.stages.chain.cycles.axis import (
     Axis,
+    usable_segments,
     whole_segments,
 )
 from opamc_cli.stages.chain.cycles.reference import (
     Reference,
-    usable_segments,
 )
 
 AT_PLACES = 0.5
@@ -89,7 +89,7 @@ def mixes(
 
 def _told(part: Axis, reference: Reference, rule: MatchRule) -> npt.NDArray[np.int64]:
     """Return which motion of a reference each segment of an axis is."""
-    told, usable = np.full(len(part.features), UNIDENTIFIED), usable_segments(part, reference)
+    told, usable = np.full(len(part.features), UNIDENTIFIED), usable_segments(part, reference.edges)
     own = part.features.take(usable)
     told[usable] = identify_anywhere(reference.features, own, rule).motion
     return told

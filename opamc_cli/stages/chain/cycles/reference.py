@@ -15,7 +15,7 @@ from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
 from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency
-from opamc_cli.stages.chain.cycles.axis import Axis, axes_of, span_at, values_of, whole_segments
+from opamc_cli.stages.chain.cycles.axis import Axis, axes_of, span_at, usable_segments, values_of
 from opamc_cli.stages.chain.cycles.leads import with_leads
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.recordings.envelope import read_envelope
@@ -47,11 +47,6 @@ class Reference:
     spans: tuple[tuple[int, int], ...]
     carrier_hz: npt.NDArray[np.float64]
     edges: bool
-
-
-def usable_segments(part: Axis, reference: Reference) -> npt.NDArray[np.int64]:
-    """Return the indices of segments that are whole: at an edge if those of the reference are."""
-    return np.arange(part.rows.num_rows) if reference.edges else whole_segments(part)
 
 
 def given_references(
@@ -124,7 +119,8 @@ def own_references(
         if reference_run not in (None, part.source.name):
             continue
         edges = executions[part.axis]
-        usable = np.arange(part.rows.num_rows) if edges else whole_segments(part)
+        usable = usable_segments(part, edges)
+        usable = usable[np.isfinite(part.features.duration_s[usable])]
         if usable.size == 0:
             continue
         features = part.features.take(usable)
@@ -164,7 +160,9 @@ def _without_chance(reference: Reference, parts: Sequence[Axis], rule: MatchRule
         return reference
     always = np.ones(len(cycle), dtype=bool)
     for part in parts:
-        found = identify_anywhere(cycle, part.features.take(usable_segments(part, reference)), rule)
+        found = identify_anywhere(
+            cycle, part.features.take(usable_segments(part, reference.edges)), rule
+        )
         n_cycles = found.cycle.max(initial=UNIDENTIFIED) + 1
         always &= np.bincount(found.motion + 1, minlength=len(cycle) + 1)[1:] >= n_cycles
     kept = np.flatnonzero(always | ~doubtful)
@@ -176,7 +174,7 @@ def _without_chance(reference: Reference, parts: Sequence[Axis], rule: MatchRule
     )
     # where both halves of a program are alike, only what is small may tell them apart
     [own] = [part for part in parts if part.source == reference.source]
-    usable = usable_segments(own, reference)
+    usable = usable_segments(own, reference.edges)
     motion = identify_anywhere(rest.features, own.features.take(usable), rule).motion
     places = [span_at(own.rows, i) for i in usable.tolist()]
     found_again = [m == motion[places.index(span)] for m, span in enumerate(rest.spans)]
@@ -184,7 +182,7 @@ def _without_chance(reference: Reference, parts: Sequence[Axis], rule: MatchRule
 
 
 def _holds(part: Axis, cycle: SegmentFeatures, rule: MatchRule) -> bool:
-    own = part.features.take(whole_segments(part))
+    own = part.features.take(usable_segments(part, False))
     return bool((identify_anywhere(cycle, own, rule).cycle > UNIDENTIFIED).any())
 
 

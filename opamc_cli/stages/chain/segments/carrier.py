@@ -32,6 +32,7 @@ from opamc_cli.signal.transform.wavelet import Morse
 from opamc_cli.stages.chain.segments.rows import (
     STILL_SHARE,
     AxisSegments,
+    Gaps,
     Segment,
     lost,
     make_rows,
@@ -92,7 +93,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     band = motion_band(run.sampling_rate_hz, config)
     _check_band(run, band)
     probe = _look(run, names, config)
-    evidence, notes, missing = _gather(run, names, band, probe, config)
+    evidence, notes, missing, gaps = _gather(run, names, band, probe, config)
     rule = MotionRule(
         on=config.threshold_on,
         off=config.threshold_off,
@@ -110,7 +111,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     strongest = float(evidence.frames.strength.max(initial=0))
     return AxisSegments(
         run.name,
-        make_rows(run, channels, segments, signal),
+        make_rows(run, channels, segments, signal, gaps),
         probe.notes + notes,
         f"axis {channels.axis}: S(t) reaches {strongest:.2f}, {config.threshold_on:g} is motion",
         lost(channels.axis, missing / run.n_samples),
@@ -163,8 +164,8 @@ def _look(run: Run, names: Sequence[str], config: SegmentConfig) -> _Probe:
 
 def _gather(
     run: Run, names: Sequence[str], band: MotionBand, probe: _Probe, config: SegmentConfig
-) -> tuple[Evidence, tuple[str, ...], int]:
-    """Read the whole run once, block by block, and keep its frames only."""
+) -> tuple[Evidence, tuple[str, ...], int, list[tuple[int, int]]]:
+    """Read the whole run once, block by block; keep its frames, and where numbers lack."""
     fs_hz = run.sampling_rate_hz
     step = frame_step(fs_hz)
     motion = MotionStream(band, fs_hz, step, engine=config.engine)
@@ -172,6 +173,7 @@ def _gather(
     hilbert = AnalyticStream(fs_hz, band.f_min_hz) if len(names) == 1 else None
     frames, turns = [], []
     n_missing = dict.fromkeys(names, 0)
+    gaps = Gaps()
     lowest = dict.fromkeys(names, np.inf)
     highest = dict.fromkeys(names, -np.inf)
     sizes = {name: Size(LIMITS["A"]) for name in names}
@@ -182,11 +184,13 @@ def _gather(
 
     for _, block in run.blocks(names):
         phases = []
+        whole = np.ones(block[names[0]].size, dtype=bool)
         for name in names:
             x = block[name].astype(np.float32, copy=False)
             low, high = float(x.min()), float(x.max())
             if not np.isfinite(low + high):
                 known = np.isfinite(x)
+                whole &= known
                 n_missing[name] += int(x.size - known.sum())
                 low = float(x.min(where=known, initial=np.inf))
                 high = float(x.max(where=known, initial=-np.inf))
@@ -195,6 +199,7 @@ def _gather(
             sizes[name].add(x)
             lowest[name], highest[name] = min(lowest[name], low), max(highest[name], high)
             phases.append(x)
+        gaps.push(whole)
         if hilbert is None:
             take(clarke(*phases) - np.complex64(probe.offset_a))
         else:
@@ -222,7 +227,7 @@ def _gather(
         noise_a=probe.noise_a,
         f_floor_hz=band.f_min_hz,
     )
-    return evidence, notes, max(n_missing.values())
+    return evidence, notes, max(n_missing.values()), gaps.spans()
 
 
 def _current(phases: Sequence[Floats]) -> npt.NDArray[np.inexact]:

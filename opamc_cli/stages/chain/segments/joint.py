@@ -19,6 +19,7 @@ from opamc_cli.signal.plausible.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
     STILL_SHARE,
     AxisSegments,
+    Gaps,
     Segment,
     lost,
     make_rows,
@@ -32,6 +33,9 @@ from opamc_cli.storage.runs.run import Run
 USUAL_GEAR_RATIO = 100.0
 """Stands in for an unknown ratio in f_d,max, which motions are then compared by: strain wave gears
 of robot arms have 50 to 160. Delays are chosen by the current itself, see stage `identify`."""
+
+SLOWER = 0.5
+"""Share of samples at which a channel has numbers: with fewer it is logged at a lower rate."""
 
 
 def joint_segments(
@@ -50,6 +54,13 @@ def joint_segments(
     assert name is not None
     velocity, source = _velocity(run, channels)
     current = run.read([name])[name]
+    whole = np.isfinite(current)
+    for column in filter(None, (channels.position, channels.velocity)):
+        logged = np.isfinite(run.read([column])[column])
+        if np.mean(logged) > SLOWER:
+            whole &= logged
+    gaps = Gaps()
+    gaps.push(whole)
     known = current[np.isfinite(current)]
     if not known.size:
         msg = (
@@ -57,8 +68,8 @@ def joint_segments(
             "check the drive's log or leave the axis out"
         )
         raise InputError(msg)
-    logged = source == channels.velocity
-    speed_of, kind = (source, "velocity") if logged else (f"{source} (its speed)", "position")
+    by_speed = source == channels.velocity
+    speed_of, kind = (source, "velocity") if by_speed else (f"{source} (its speed)", "position")
     beyond = [
         run.doubt(name),
         limited(run.path, name, known, LIMITS[run.info.current_unit]),
@@ -102,12 +113,12 @@ def joint_segments(
     shortest_s = max(config.min_motion_s, FEWEST_SAMPLES / run.sampling_rate_hz)
     return AxisSegments(
         run.name,
-        make_rows(run, channels, segments, "reported"),
+        make_rows(run, channels, segments, "reported", gaps.spans()),
         tuple(notes),
         f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
         f"{config.min_speed_rad_s:g} is motion where it lasts for {shortest_s:.2g} s",
         lost(channels.axis, 1 - known.size / current.size),
-        current.size - known.size,
+        int(whole.size - whole.sum()),
     )
 
 

@@ -13,7 +13,7 @@ from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 
 EDGE_S = 0.05
-"""A motion that begins or ends this near to the recording's edge may have been cut by it."""
+"""A motion this near to the recording's edge, or to a gap of this length, may be cut by it."""
 
 STILL_SHARE = 0.05
 """A recording that stands still for less than this share never stands still."""
@@ -49,7 +49,7 @@ class AxisSegments(NamedTuple):
     lost: str | None = None
     """One sentence if so many samples are no numbers that motions are likely among them."""
     n_missing: int = 0
-    """Samples of its current that are no numbers."""
+    """Samples at which its current, or what tells its motion, is no number."""
 
 
 def lost(axis: int, share: float) -> str | None:
@@ -62,13 +62,36 @@ def lost(axis: int, share: float) -> str | None:
     )
 
 
+class Gaps:
+    """Where channels have no numbers, gathered block by block."""
+
+    def __init__(self) -> None:
+        self._flips: list[int] = []
+        self._known = True
+        self._n = 0
+
+    def push(self, known: npt.NDArray[np.bool_]) -> None:
+        """Take which samples of the next block are numbers."""
+        flips = np.flatnonzero(np.diff(known, prepend=self._known))
+        self._flips += (flips + self._n).tolist()
+        self._known, self._n = bool(known[-1]), self._n + known.size
+
+    def spans(self) -> list[tuple[int, int]]:
+        """Return the first sample of each gap, and the one behind its last."""
+        ends = self._flips if self._known else [*self._flips, self._n]
+        return list(zip(ends[::2], ends[1::2], strict=True))
+
+
 def make_rows(
     run: Run,
     channels: AxisChannels,
     segments: Sequence[Segment],
     signal: str,
+    gaps: Sequence[tuple[int, int]],
 ) -> tuple[dict[str, Any], ...]:
     """Complete segments to rows: temperature, edges, and what they have in common."""
+    margin = EDGE_S * run.sampling_rate_hz
+    beyond = [(0, 0), *((a, b) for a, b in gaps if b - a >= margin), (run.n_samples, run.n_samples)]
     return tuple(
         {
             "run": run.name,
@@ -80,7 +103,7 @@ def make_rows(
             "f_max_hz": segment.f_max_hz,
             "direction": segment.direction,
             "variance": segment.variance,
-            "edge": segment.kind == "motion" and _touches_edge(run, segment),
+            "edge": segment.kind == "motion" and _is_cut(segment, beyond, margin),
             "kind": segment.kind,
             "signal": signal,
             "temperature_c": _mean_temperature(run, channels, segment),
@@ -144,9 +167,8 @@ def read_in_pieces(
         yield run.read(names, begin, min(stop, begin + ROW_GROUP_SAMPLES))
 
 
-def _touches_edge(run: Run, segment: Segment) -> bool:
-    margin = EDGE_S * run.sampling_rate_hz
-    return segment.start < margin or segment.stop > run.n_samples - margin
+def _is_cut(segment: Segment, beyond: Sequence[tuple[int, int]], margin: float) -> bool:
+    return any(a - margin < segment.stop and segment.start < b + margin for a, b in beyond)
 
 
 def _mean_temperature(run: Run, channels: AxisChannels, segment: Segment) -> float | None:

@@ -95,17 +95,20 @@ class _Job:
 def measure(
     sources: Sequence[RunSource], segments: pa.Table, kept: KeptResults | None = None
 ) -> list[Measured]:
-    """Measure every axis of every run, from a few of its motions.
+    """Measure every axis of every run, from a few of its motions that no gap has cut.
 
     Raises
     ------
     InputError
         If samples of a run cannot be read.
     """
+    rows: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in segments.select(["run", "axis", "start", "stop", "edge"]).to_pylist():
+        rows.setdefault((row["run"], row["axis"]), []).append(row)
     spans: dict[str, dict[int, list[tuple[int, int]]]] = {}
-    for row in segments.select(["run", "axis", "start", "stop"]).to_pylist():
-        of_run = spans.setdefault(row["run"], {})
-        of_run.setdefault(row["axis"], []).append((row["start"], row["stop"]))
+    for (name, axis), own in rows.items():
+        whole = [*own[:1], *(row for row in own[1:-1] if not row["edge"]), *own[1:][-1:]]
+        spans.setdefault(name, {})[axis] = [(row["start"], row["stop"]) for row in whole]
     measured = remembered(_measure_run, kept)
     return [
         Measured(source.name, source.path, **values)

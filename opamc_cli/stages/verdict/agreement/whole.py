@@ -105,9 +105,7 @@ def with_gaps(baseline: Side, target: Side) -> list[InputError]:
 
 
 def _no_numbers(count: int, axes: Sequence[int]) -> str:
-    are = "sample of the current of {} is no number"
-    if count > 1:
-        are = "samples of the current of {} are no numbers"
+    are = "samples of {} are no numbers" if count > 1 else "sample of {} is no number"
     return f"{count} {are.format(axes_phrase(axes))}"
 
 

@@ -37,7 +37,7 @@ def resampled_slowly(times, values, grid, period, max_gap, cubic):
     return np.array(out)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     steps=st.lists(st.floats(0.05, 4.0), min_size=3, max_size=40),
     cuts=st.lists(st.integers(1, 40), max_size=6),

@@ -1,0 +1,83 @@
+"""A gap in a current that spans the end of a motion cuts it, as a recording's edge does."""
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from carriers import Move, record
+
+from opamc_cli.config import load_config
+from opamc_cli.stages.chain import segment
+from opamc_cli.stages.chain.segments.rows import Gaps
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
+
+RATE_HZ = 2048.0
+MOVES = [Move(157, 1), Move(150, -1), Move(140, 1), Move(150, -1)]
+"""So alike that a cycle would fit from every second motion on."""
+
+
+def recording(path, seed, cycles, gap=None):
+    made = record(MOVES * cycles, noise=0.02, seed=seed)
+    phases = made.phases.copy()
+    if gap is not None:
+        phases[:, made.intervals[gap][1] - 300 : made.intervals[gap + 1][0] + 300] = np.nan
+    values = {f"axis1_{name}": x for name, x in zip("abc", phases, strict=True)}
+    save_run(path, RunInfo(sampling_rate_hz=RATE_HZ), values)
+    return made.intervals
+
+
+@pytest.mark.parametrize(
+    ("cycles", "gap", "whole"), [(2, 3, []), (3, 3, [8]), (4, 5, [0, 8, 12]), (3, 0, [4, 8])]
+)
+def test_what_a_gap_cuts_is_in_no_cycle_and_none_reaches_across(tmp_path, cycles, gap, whole):
+    for seed in range(2):
+        recording(tmp_path / f"baseline/{seed}.parquet", seed, 3)
+    intervals = recording(tmp_path / "target/1.parquet", 9, cycles, gap)
+    reference = run_chain([tmp_path / "baseline"], load_config(), tmp_path / "b").motions
+    found = run_chain([tmp_path / "target"], load_config(), tmp_path / "t", reference=reference)
+    middles = np.mean(intervals, axis=1)
+    members = {}
+    for row in pq.read_table(found.motions).to_pylist():
+        which = int(np.argmin(np.abs(middles - (row["start"] + row["stop"]) / 2)))
+        assert row["edge"] == (which in (gap, gap + 1))
+        if row["cycle"] >= 0:
+            members.setdefault(row["cycle"], []).append((row["motion"], which))
+    assert list(members.values()) == [[(m, first + m) for m in range(4)] for first in whole]
+
+
+@pytest.mark.parametrize(
+    ("channel", "first", "n", "cut"),
+    [
+        ("position", 930, 60, (2,)),  # spans a start
+        ("position", 1190, 180, (2, 3)),  # spans a rest
+        ("current", 1070, 60, (2,)),  # amid a motion
+        ("current", 850, 60, ()),  # at rest
+    ],
+)
+def test_so_does_a_gap_in_what_tells_the_motion(tmp_path, channel, first, n, cut):
+    stroke = 0.5 - 0.5 * np.cos(np.pi * np.arange(250) / 250)
+    there = [np.zeros(150), stroke, np.ones(150), 1 - stroke]
+    position = np.concatenate([*there * 4, np.zeros(150)])
+    speed = np.gradient(position) * 250
+    rng = np.random.default_rng(4)
+    current = np.tanh(speed / 0.02) + 0.5 * speed + 0.01 * rng.normal(size=speed.size)
+    values = {"axis1_current": current, "axis1_position": position}
+    values[f"axis1_{channel}"][first : first + n] = np.nan
+    save_run(tmp_path / "run.parquet", RunInfo(sampling_rate_hz=250.0), values)
+    outcome = segment.run([tmp_path / "run.parquet"], load_config(), tmp_path / "out")
+    edges = outcome.table["edge"].to_pylist()
+    assert [i for i, edge in enumerate(edges) if edge] == list(cut)
+    assert outcome.missing == {("run", 1): n}
+
+
+def test_gaps_are_told_across_blocks():
+    known = np.random.default_rng(3).random(1000) < 0.6
+    gaps = Gaps()
+    for block in np.split(known, [1, 4, 300, 301, 777]):
+        gaps.push(block)
+    told = np.ones(known.size, dtype=bool)
+    for first, last in gaps.spans():
+        assert not known[first:last].any()
+        told[first:last] = False
+    np.testing.assert_array_equal(told, known)
