@@ -109,7 +109,12 @@ class ClosedLoop(Rows):
 def read_run(path: AnyPath, columns: str | Sequence[str] | None = None) -> RunRows:
     """Read the samples of a run.
 
-    Of all its columns, or of those named, such as ``["axis1_a", "axis1_position"]``.
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Such as ``["axis1_a", "axis1_position"]``, or one; None: all.
 
     Raises
     ------
@@ -145,8 +150,16 @@ def segment(
 ) -> Rows:
     """Cut runs into motions, axis by axis; writes segments.parquet.
 
-    Of run files and folders of them; `out` is the table's folder, `settings` are options that
-    differ from the defaults, `jobs` worker processes.
+    Parameters
+    ----------
+    runs
+        Run files and folders of them.
+    out
+        Folder of the table.
+    settings
+        Options that differ from the defaults.
+    jobs
+        Worker processes.
     """
     return _stage(motions.run, _paths(runs), out, settings, jobs)
 
@@ -169,7 +182,12 @@ def identify(
 ) -> Rows:
     """Find the cycles and motions of a segment table; writes motions.parquet.
 
-    By default of the table in `out`; see `segment`.
+    Parameters
+    ----------
+    segments
+        Table of `segment`; None: the one in `out`.
+    out, settings, jobs
+        As of `segment`.
     """
     return _stage(cycles.run, Path(segments or Path(out) / files.SEGMENTS), out, settings, jobs)
 
@@ -183,7 +201,12 @@ def patterns(
 ) -> Rows:
     """Count ordinal patterns of every motion; writes patterns.parquet and the witnesses' tables.
 
-    By default of the table in `out`; see `segment`.
+    Parameters
+    ----------
+    motions
+        Table of `identify`; None: the one in `out`.
+    out, settings, jobs
+        As of `segment`.
     """
     return _stage(counts.run, Path(motions or Path(out) / files.MOTIONS), out, settings, jobs)
 
@@ -193,7 +216,12 @@ def score(
 ) -> Scores:
     """Compare the target's patterns with the baseline's; writes scores and features.
 
-    Both are tables of `patterns`; see `segment`.
+    Parameters
+    ----------
+    baseline, target
+        Tables of `patterns`.
+    out, settings
+        As of `segment`.
     """
     folder = Path(out)
     with output_lock(folder):
@@ -213,7 +241,12 @@ def diagnose(
 ) -> Diagnosis:
     """Judge target runs against baseline runs, joint by joint, as `opamc diagnose` does.
 
-    Both are run files and folders of them; see `segment`.
+    Parameters
+    ----------
+    baseline, target
+        Run files and folders of them.
+    out, settings, jobs
+        As of `segment`.
     """
     folder = Path(out)
     with output_lock(folder):
@@ -248,9 +281,20 @@ def close_loop(
 ) -> ClosedLoop:
     """Find and name what a declared model of a joint lacks, as `opamc model close` does.
 
-    What is declared is a YAML file, or a shipped one by its name; axes count from 1, empty: all.
-    Options are those of the model, such as ``{"joint.gear_ratio": 100}``; `seed` is that of what is
-    drawn. See `segment`.
+    Parameters
+    ----------
+    runs
+        Run files and folders of them.
+    model
+        What is declared: a YAML file, or a shipped one by its name.
+    axes
+        From 1; empty: all.
+    out, settings
+        As of `segment`; options are those of the model, such as ``{"joint.gear_ratio": 100}``.
+    seed
+        Of what is drawn.
+    jobs
+        Worker processes.
     """
     folder = Path(out)
     declared = load_joint_model(Path(model), _overrides(settings))

@@ -23,7 +23,12 @@ class ExitCode(IntEnum):
 class OpamcError(Exception):
     """Root of the errors that end in one sentence and an exit code.
 
-    About some joints, by their numbers; without any, about all of a recording, or about none.
+    Parameters
+    ----------
+    *args
+        The sentence, and what a subclass keeps beside it.
+    axes
+        Joints that it is about; empty: all of a recording, or of none.
     """
 
     exit_code: ExitCode = ExitCode.BUG

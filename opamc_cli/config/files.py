@@ -20,7 +20,12 @@ Model = TypeVar("Model", bound=BaseModel)
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:
     """Return the configuration of a file, with `key=value` overrides applied.
 
-    The defaults without a file; an override is such as ``patterns.gamma=1``, its value YAML.
+    Parameters
+    ----------
+    path
+        YAML file; None for the defaults.
+    overrides
+        Such as ``patterns.gamma=1``; values are YAML.
 
     Raises
     ------
@@ -36,7 +41,14 @@ def read_values(
 ) -> dict[str, Any]:
     """Return the mapping of a YAML file (empty without one), with `key=value` overrides applied.
 
-    `prepare` is applied to the text of the file and of every override before it is read.
+    Parameters
+    ----------
+    path
+        The file; None: no file.
+    overrides
+        Such as ``patterns.gamma=1``; values are YAML.
+    prepare
+        Applied to the text of the file and of every override before it is read.
 
     Raises
     ------

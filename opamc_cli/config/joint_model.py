@@ -99,7 +99,12 @@ def line_naming(path: Path, name: str) -> int | None:
 def load_joint_model(path: Path, overrides: Sequence[str] = ()) -> JointModelConfig:
     """Return the model that a YAML file, or a shipped one by its name, declares.
 
-    With overrides, such as ``joint.gear_ratio=100``.
+    Parameters
+    ----------
+    path
+        The file.
+    overrides
+        Such as ``joint.gear_ratio=100``.
 
     Raises
     ------

@@ -21,7 +21,14 @@ _KINDS = (
 def require_regular_file(path: Path, error: type[OpamcError], what: str = "a file") -> None:
     """Refuse what is no regular file: others can keep a reader waiting for ever.
 
-    Named is what is needed there, such as "a run file (*.parquet)".
+    Parameters
+    ----------
+    path
+        What the user named.
+    error
+        What is raised.
+    what
+        What is needed there, such as "a run file (*.parquet)".
 
     Raises
     ------

@@ -35,9 +35,26 @@ def align(
     they gain by each other. By r alone half of a smooth motion may fit another part of it better
     than noise or friction let the whole fit itself. A lag with too little overlap or a negative
     correlation does not count. Segments may differ in length. Equal gains: the smallest lag in
-    modulus wins, then the negative one. A constant or NaN-bearing segment has lag 0 and correlation
-    0. Segments, (n,) and (m,), are of the same unit and rate, the lag is in samples. Equation (4-1)
-    of the thesis.
+    modulus wins, then the negative one. A constant or NaN-bearing segment has lag 0 and
+    correlation 0.
+
+    Parameters
+    ----------
+    reference
+        Shape (n,), any unit.
+    segment
+        Shape (m,), the same unit and rate.
+    max_lag
+        Largest lag in modulus, samples, >= 0.
+
+    Returns
+    -------
+    Alignment
+        Lag and correlation.
+
+    Notes
+    -----
+    Equation (4-1) of the thesis.
     """
     x = np.asarray(reference, dtype=np.float64)
     y = np.asarray(segment, dtype=np.float64)

@@ -10,9 +10,17 @@ FLOOR_A = 1e-6
 def log_amplitudes(current: NDArray[np.floating]) -> NDArray[np.float64]:
     """Logarithms of three sizes of a current.
 
-    Of one motion, (n,), A: of its root mean square, that of the differences of successive samples,
-    and its mean size, (3,); empty for fewer than two samples, or with one that is unknown: another
-    part of the motion has another size.
+    Parameters
+    ----------
+    current : ndarray, shape (n,)
+        Samples of one motion, A.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Of its root mean square, that of the differences of successive samples, and its mean size;
+        empty for fewer than two samples, or with one that is unknown: another part of the motion
+        has another size.
     """
     x = np.asarray(current, dtype=np.float64)
     if x.size < 2 or not np.isfinite(x).all():

@@ -19,9 +19,20 @@ LEAST_WEIGHT = 1.0
 def mean_course(current: NDArray[np.floating], parts: int) -> NDArray[np.float64]:
     """Mean of a current in each of equal parts.
 
-    Of one motion, (n,), NaN passed over; m at most `parts`, fewer rather than shorter ones than
-    `LEAST_SAMPLES`. NaN where a part has no known sample, empty without any part.
+    Parameters
+    ----------
+    current : ndarray, shape (n,)
+        Samples of one motion; NaN is passed over.
+    parts : int
+        Parts wanted; fewer are made rather than shorter ones than `LEAST_SAMPLES`.
 
+    Returns
+    -------
+    ndarray, shape (m,)
+        m at most `parts`; NaN where a part has no known sample, empty without any part.
+
+    Notes
+    -----
     Edge rule: part k holds samples ceil(k n/m) to ceil((k+1) n/m), half-open, so that every sample
     counts once.
     """
@@ -46,13 +57,25 @@ def repeated_course(
 ) -> NDArray[np.float64]:
     """Mean course of a signal over the angle along each kind of stroke, of other units.
 
-    Strokes are half-open spans of one way, each within a unit; `unit`, (n,), says what each sample
-    is of, and `source`, (n,), from which a course may be taken: whole units. The spacing is the
-    angle between the corners of the polygon that a course is: of what changes faster, a ripple of a
-    whole number of cycles per spacing above all, hardly any is in a course.
+    Parameters
+    ----------
+    angle, values : ndarray, shape (n,)
+        Where the joint is, and the signal; NaN is passed over.
+    strokes : sequence of pairs of int
+        Half-open spans of one way, each within a unit.
+    unit : ndarray, shape (n,)
+        What each sample is of.
+    source : ndarray, shape (n,)
+        Samples that a course may be taken from; whole units.
+    spacing : float
+        Angle between the corners of the polygon that a course is: of what changes faster, a ripple
+        of a whole number of cycles per spacing above all, hardly any is in a course.
 
-    Shape (n,), by least squares over the strokes that begin and end alike and are of the source and
-    of another unit; NaN where there is none, and outside the strokes.
+    Returns
+    -------
+    ndarray, shape (n,)
+        By least squares over the strokes that begin and end alike and are of the source and of
+        another unit; NaN where there is none, and outside the strokes.
     """
     near = SAME_END * float(np.ptp(angle)) if angle.size else 0.0
     kinds: list[list[tuple[int, int]]] = []

@@ -33,8 +33,18 @@ def mean_over_turns(
     over time is off by 5 to 12 mA where a motion of 12 to 150 turns ends with 0.12 s at rest, by 25
     to 33 mA with 0.3 s; over turns by 0.4 to 0.9 mA (root mean squares, 60 made-up joints each).
 
-    Of each motion's current vector, (n,), A, NaN passed over, see `TURNS_AT_TOP_SPEED`, and the
-    highest frequency at which it turns, Hz; in ampere, 0 of what does not turn.
+    Parameters
+    ----------
+    motions : iterable of (array, shape (n,), A; float, Hz)
+        Current vector of each motion, see `TURNS_AT_TOP_SPEED`, and the highest frequency at which
+        it turns; NaN are passed over.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    complex
+        In ampere; 0 of what does not turn.
     """
     total, weight = 0j, 0.0
     for vector, f_max_hz in motions:
@@ -50,9 +60,20 @@ def mean_over_turns(
 def turning_means(z: NDArray[np.complexfloating], fs_hz: float) -> NDArray[np.complex128]:
     """Tapered means of the current vector over short pieces in which it turns.
 
-    The vector turns, its sensors' offset stands still. While the robot stands the mean is a holding
-    torque, so those pieces are passed over. Of a vector, (n,), A: one mean per piece of 0.25 s,
-    without NaN, that holds at least four turns.
+    The vector turns, its sensors' offset stands still. While the robot stands the mean is a
+    holding torque, so those pieces are passed over.
+
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Current vector; pieces with NaN are passed over.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    array, shape (k,), A
+        One mean per piece of 0.25 s that holds at least four turns.
     """
     length = max(2, round(PIECE_S * fs_hz))
     count = z.size // length
@@ -68,8 +89,15 @@ def turning_means(z: NDArray[np.complexfloating], fs_hz: float) -> NDArray[np.co
 def turning_offset(means: NDArray[np.complex128]) -> complex:
     """Offset of the current vector from its means over pieces: their median by component.
 
-    Means of `turning_means`, (k,), A; in ampere, 0 for fewer than four pieces, which could not
-    outvote an odd one.
+    Parameters
+    ----------
+    means : array, shape (k,), A
+        Of `turning_means`.
+
+    Returns
+    -------
+    complex
+        In ampere; 0 for fewer than four pieces, which could not outvote an odd one.
     """
     if means.size < 4:
         return 0j

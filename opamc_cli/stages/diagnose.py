@@ -90,8 +90,27 @@ def run(
 ) -> DiagnoseOutcome:
     """Compare target runs with baseline runs, joint by joint.
 
-    Figures of healthy joints take longer than the diagnosis of a short recording; `worded` puts a
-    note where recordings lie elsewhere than their user knows. See `run_chain`.
+    Parameters
+    ----------
+    baseline, target
+        Run files and folders of them.
+    config
+        All options.
+    out
+        Folder of all tables, verdict.json and report.html.
+    models
+        Trained discriminants, for the latent axis.
+    jobs
+        Worker processes.
+    progress
+        Called with the name of each step as it begins.
+    kept
+        Where results of the same work on the baseline may lie.
+    figures_of_healthy
+        Whether joints that are healthy have their part in the report's figures, which take longer
+        than the diagnosis of a short recording.
+    worded
+        How a note is put where recordings lie elsewhere than their user knows.
 
     Raises
     ------
@@ -213,7 +232,12 @@ def _causes(
 ) -> tuple[dict[int, dict[str, Any]], list[str]]:
     """Seek what has changed in each axis that differs.
 
-    Returned are causes by axis, empty where one was sought in vain, and which could not be sought.
+    Returns
+    -------
+    dict of int to dict
+        By axis; empty where a cause was sought in vain.
+    list of str
+        Which could not be sought, and why.
     """
     differing = decided.differing(config.score) if config.joint.explain else []
     causes: dict[int, dict[str, Any]] = {}

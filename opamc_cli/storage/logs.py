@@ -126,8 +126,12 @@ def _facts() -> TypeAdapter[Facts]:
 def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
     """List the recordings that fit a pattern, sorted by path.
 
-    Its pattern holds {robot} and maybe {night}; robots are those whose names may stand there, None:
-    any.
+    Parameters
+    ----------
+    pattern
+        With {robot} and maybe {night}.
+    robots
+        Names that may stand in the place of {robot}; None: any.
 
     Raises
     ------
@@ -158,8 +162,13 @@ def find_logs_and_strays(
 def find_unnamed(pattern: str, robots: tuple[str, ...]) -> list[tuple[str, str]]:
     """List the robots that have recordings beside some, and where.
 
-    The folders of the place of {robot} are listed, and of others than these robots' a file is
-    looked for.
+    Parameters
+    ----------
+    pattern
+        With {robot}; the folders of its place are listed, and of others than these robots' a file
+        is looked for.
+    robots
+        Names.
     """
     head = pattern[: (f"{pattern}/").index("/", pattern.index("{robot}"))]
     places = _expression(head)
@@ -213,7 +222,10 @@ def holds_logs(pattern: str, folder: str) -> bool:
 def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:
     """List the folders of some robots that may not be listed: whatever lies there is not missing.
 
-    Of other names a folder may be closed for good (``lost+found``).
+    Parameters
+    ----------
+    pattern, robots
+        As of `find_logs`; of other names a folder may be closed for good (``lost+found``).
     """
     folders = () if "://" in pattern else _folders(pattern)
     return [log for of in folders for log in _as_logs(_closed(of, robots), of, robots)]
@@ -240,7 +252,17 @@ def _as_logs(
 def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
     """Read a recording once: its SHA-256 and what it says of itself.
 
-    It, or its copy, can be opened `at` a path. The hash is empty if the system refused to read it.
+    Parameters
+    ----------
+    log
+        The recording.
+    at
+        Where it, or its copy, can be opened.
+
+    Returns
+    -------
+    tuple of str and Facts
+        The hash is empty if the system refused to read it.
     """
     digest = hashlib.sha256()
     if NO_TEXT in log.path:

@@ -95,8 +95,13 @@ def sources_record(sources: Sequence[RunSource], folder: Path) -> dict[str, Any]
 def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource, ...]:
     """Return the runs that the stage table at `table` was made from.
 
-    Runs that are no longer where they were are looked for in the folders `moved_to`, by name or
-    file name.
+    Parameters
+    ----------
+    table
+        A stage table.
+    moved_to
+        Folders where the runs are now, if they are no longer where they were; each run is
+        looked for there by its name or file name.
 
     Raises
     ------
@@ -131,6 +136,11 @@ def current_unit(sources: Iterable[RunSource]) -> str:
 
 def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> tuple[str, ...]:
     """Check that runs can be compared, and say which of their conditions differ.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each condition that differs but does not forbid the comparison.
 
     Raises
     ------

@@ -49,9 +49,20 @@ def write_table(
 ) -> None:
     """Write a stage table atomically, with its provenance and page checksums.
 
-    Its rows are in their final order; the options are plain JSON types and hashed into
-    `config_hash`, inputs are (path, SHA-256) of every file that was read, and further JSON may go
-    with them, such as a fitted reference.
+    Parameters
+    ----------
+    path
+        Where to.
+    table
+        Rows in their final order.
+    stage
+        What made it.
+    config
+        The options that it was made with, as plain JSON types; hashed into `config_hash`.
+    inputs
+        (path, SHA-256) of every file that was read.
+    extra
+        Further JSON for the same metadata key, such as a fitted reference.
 
     Raises
     ------
@@ -96,8 +107,14 @@ def _refuse_to_replace_others(path: Path) -> None:
 def read_table(path: Path, stage: str, schema: pa.Schema | None = None) -> pa.Table:
     """Read a stage table and check that it is what it should be.
 
-    Checked are the stage that must have written it and, with their types, columns that it must
-    hold.
+    Parameters
+    ----------
+    path
+        The Parquet file.
+    stage
+        The stage that must have written it.
+    schema
+        Columns that it must hold, with their types.
 
     Raises
     ------

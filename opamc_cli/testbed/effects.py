@@ -142,8 +142,17 @@ _POSITIVE = ("width_rad", "time_constant_s", "velocity_rad_s", "frequency_hz")
 def apply_to_constants(effects: Sequence[Effect], constants: Constants) -> NDArray[np.float64]:
     """Switch the mechanical and electrical effects of one axis on.
 
-    The constants are changed in place. Returned are the ripples for the kernel, (k, 4): order,
-    amplitude in A, phase in rad, exponent of the speed.
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one axis, completed.
+    constants : dict
+        The axis's constants by name; changed in place.
+
+    Returns
+    -------
+    ndarray, shape (k, 4)
+        The ripples for the kernel: order, amplitude in A, phase in rad, exponent of the speed.
     """
     ripples = []
     for effect in effects:
@@ -167,8 +176,20 @@ def apply_to_sensors(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Switch the sensor effects of one axis on for its phase currents.
 
-    Of gain and offset, (3,), and the current vector, alpha and beta, (n, 2), as they are with the
-    effects; the third of what is returned is the hum, (n, 3).
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one axis, completed.
+    gain, offset_a : ndarray, shape (3,)
+        Of the sensors.
+    vector_a : ndarray, shape (n, 2)
+        Current vector, alpha and beta.
+    rate_hz : float
+
+    Returns
+    -------
+    gain, offset_a, hum_a, vector_a : ndarray
+        As they are with the effects; the hum has shape (n, 3).
     """
     gain, offset_a = gain.copy(), offset_a.copy()
     hum = np.zeros((len(vector_a), 3))
@@ -194,8 +215,15 @@ def apply_to_reported(
     """Apply the sensor effects of one axis to its reported current.
 
     The drive computes what it reports from its own phase sensors: an error of one of them turns
-    with the field, once per electrical revolution for an offset, twice for a gain. Current and
-    angle of the rotor's field are (n,).
+    with the field, once per electrical revolution for an offset, twice for a gain.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one axis, completed.
+    current_a, electrical_rad : ndarray, shape (n,)
+        Reported torque current and the angle of the rotor's field.
+    rate_hz : float
     """
     out = current_a
     for effect in effects:

@@ -96,7 +96,20 @@ def reference(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return reference position, velocity and acceleration of one axis.
 
-    From where the axis stands before its first motion; (n,) each, rad, rad/s, rad/s².
+    Parameters
+    ----------
+    plan : Schedule
+    axis : int
+    rest_rad : float
+        Where the axis stands before its first motion.
+    rate_hz : float
+        Rate of the result.
+    n : int
+        Number of values.
+
+    Returns
+    -------
+    position_rad, velocity_rad_s, acceleration_rad_s2 : ndarray, shape (n,)
     """
     position = np.full(n, rest_rad)
     velocity = np.zeros(n)

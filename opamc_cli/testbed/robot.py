@@ -87,8 +87,26 @@ def simulate(
 ) -> Recording:
     """Record one session of a robot that runs a program.
 
-    The same seed and session, not negative, give the same recording, whatever else is simulated; an
-    axis's does not depend on the others'. `refinement` divides the integration step.
+    Parameters
+    ----------
+    robot : Robot
+    program : Program
+    seed, session : int
+        Not negative. The same pair gives the same recording, whatever else is simulated.
+    sampling_rate_hz : float
+        Of the recording.
+    faults : mapping, optional
+        Damage by axis.
+    effects : sequence of Effect
+        What is undeclared.
+    axes : sequence of int, optional
+        Axes to record; all by default. An axis's recording does not depend on the others'.
+    refinement : int
+        Divides the integration step.
+
+    Returns
+    -------
+    Recording
 
     Raises
     ------

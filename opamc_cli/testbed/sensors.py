@@ -15,9 +15,21 @@ def phase_currents(
 ) -> NDArray[np.float32]:
     """Three phase currents as three Hall sensors and a converter report them.
 
-    Of the current vector, amplitude invariant (its length is the phases' amplitude), (n,), gain and
-    offset, (3,), and noise, (n, 3); beyond the full scale, A, values are clipped, and the bits are
-    of the range of both signs. Shape (n, 3).
+    Parameters
+    ----------
+    alpha_a, beta_a : ndarray, shape (n,)
+        Current vector, amplitude invariant (its length is the phases' amplitude).
+    gain, offset_a : ndarray, shape (3,)
+        Of the sensors.
+    noise_a : ndarray, shape (n, 3)
+    full_scale_a : float
+        Largest current that is converted; beyond it the value is clipped.
+    bits : int
+        Of the converter over the range of both signs.
+
+    Returns
+    -------
+    ndarray of float32, shape (n, 3)
     """
     half, root = 0.5, 0.5 * np.sqrt(3.0)
     ideal = np.column_stack(

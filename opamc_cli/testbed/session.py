@@ -55,5 +55,17 @@ def draw_session(robot: Robot, axis: int, seed: int, session: int) -> AxisSessio
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """Return the random stream of one purpose: the same whatever else was drawn before."""
+    """Return the random stream of one purpose: the same whatever else was drawn before.
+
+    Parameters
+    ----------
+    seed : int
+        Not negative.
+    *key : int
+        What the stream is for.
+
+    Returns
+    -------
+    numpy.random.Generator
+    """
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))

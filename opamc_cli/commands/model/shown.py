@@ -35,7 +35,10 @@ def fields_table(title: str, *headings: str) -> Any:
 def headline(result: Mapping[str, Any]) -> str:
     """Say in words what the declared model of an axis lacks.
 
-    Of one object of loop.json's `axes`.
+    Parameters
+    ----------
+    result
+        One object of loop.json's `axes`.
     """
     return printable(_headline(result))
 

@@ -18,8 +18,16 @@ GAP = 3
 class FittedTable:
     """A table whose columns are chosen when it is printed.
 
-    Given are the places of columns that are flush right, the headings of those that may be left
-    out, the first one first, and of those that hold words.
+    Parameters
+    ----------
+    headings
+        Of the columns.
+    right
+        Places of the columns that are flush right.
+    dropped
+        Headings of the columns that may be left out, the first one first.
+    wraps
+        Headings of the columns of words.
     """
 
     def __init__(

@@ -23,7 +23,13 @@ STYLES = {"healthy": "green", "changed": "yellow", "fault": "bold red", "unknown
 
 
 def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
-    """Return a verdict for the terminal: one line if all is well, else a table and what to do."""
+    """Return a verdict for the terminal: one line if all is well, else a table and what to do.
+
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+    """
     from rich.console import Group
     from rich.text import Text
 
@@ -69,8 +75,16 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
 def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     """Return a verdict in few lines: for each joint that is not healthy what, how sure, what to do.
 
-    One line if all is well, one more of few baseline sessions, and of each healthy joint that has
-    changed; a faulty joint has five at most.
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+
+    Returns
+    -------
+    list of Text
+        One line if all is well, one more of few baseline sessions, and of each healthy joint that
+        has changed; a faulty joint has five at most.
     """
     from rich.text import Text
 

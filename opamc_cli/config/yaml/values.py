@@ -68,7 +68,12 @@ _Writer.add_implicit_resolver(
 def yaml_of(value: Any, **form: Any) -> str:
     """Return a document that `plain_values` reads back.
 
-    In a form as of `yaml.dump`.
+    Parameters
+    ----------
+    value : object
+        Mappings, lists, text, numbers, truth and nothing.
+    form : object
+        As of `yaml.dump`.
     """
     text: str = yaml.dump(value, Dumper=_Writer, **form)
     return text

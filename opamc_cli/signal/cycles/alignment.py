@@ -31,14 +31,22 @@ def small(segments: SegmentFeatures, reference: SegmentFeatures) -> Bools:
 def aligned_windows(agree: Bools, extra: Bools, optional: Bools) -> Ints:
     """Align the reference cycle with the segments from each one on.
 
-    Given are, (m, n), whether a segment could be a motion of the reference; (m,), segments that may
-    stand between motions and be none; (n,), motions that may be missing, of which there are fewer
-    than half.
+    Parameters
+    ----------
+    agree
+        Shape (m, n): whether a segment could be a motion of the reference.
+    extra
+        Shape (m,): segments that may stand between motions and be none.
+    optional
+        Shape (n,): motions that may be missing, of which there are fewer than half.
 
-    Shape (m, n): for each segment the window that begins with it, which is the segment that each
-    motion is, `MISSING` where there is none; of possible ones the one with the most motions, and of
-    these the one that ends first. All of a row is missing where nothing fits, or no more than half
-    of the motions would be there.
+    Returns
+    -------
+    array
+        Shape (m, n): for each segment the window that begins with it, which is the segment that
+        each motion is, `MISSING` where there is none; of possible ones the one with the most
+        motions, and of these the one that ends first. All of a row is missing where nothing fits,
+        or no more than half of the motions would be there.
     """
     m, n = agree.shape
     windows = np.full((m, n), MISSING, dtype=np.int64)

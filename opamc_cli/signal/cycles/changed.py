@@ -32,7 +32,14 @@ def one_off(
 ) -> OneOff | None:
     """Find the motion without which the series would be cycles of the reference; or None.
 
-    Of a series, at least one segment, in which no cycle is found.
+    Parameters
+    ----------
+    reference
+        One cycle.
+    segments
+        A series in which no cycle is found, at least one segment.
+    rule
+        When a window is a cycle.
     """
     found: list[tuple[tuple[float, float], OneOff]] = []
     if len(reference) > FEWEST:

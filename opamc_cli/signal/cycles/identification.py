@@ -26,8 +26,21 @@ class Identification:
 def sliding_similarity(reference_variance: Floats, variance: Floats) -> Floats:
     """Cosine similarity of the reference's variance vector with every window of segments.
 
-    Of variances, (n,) and (m,), A², in time order: (max(0, m - n + 1),), 0..1, entry k compares
-    with segments k..k+n. Equation (3-2) of the thesis, whose variance lacks the square.
+    Parameters
+    ----------
+    reference_variance
+        Shape (n,), A².
+    variance
+        Shape (m,), A², in time order.
+
+    Returns
+    -------
+    array
+        Shape (max(0, m - n + 1),), 0..1; entry k compares with segments k..k+n.
+
+    Notes
+    -----
+    Equation (3-2) of the thesis, whose variance lacks the square.
     """
     n = len(reference_variance)
     if len(variance) < n or n == 0:
@@ -51,6 +64,20 @@ def identify(
     more between its motions (`opamc_cli.signal.cycles.alignment`), and is compared without. Of the
     windows that pass, the most that do not overlap are taken, among equally many those with the
     most motions, then those of the largest similarity. What fits nothing stays unidentified.
+
+    Parameters
+    ----------
+    reference
+        One cycle.
+    segments
+        The series to identify.
+    rule
+        When a window is a cycle.
+
+    Returns
+    -------
+    Identification
+        Cycle, motion and similarity by segment.
     """
     n, m = len(reference), len(segments)
     cycle = np.full(m, UNIDENTIFIED, dtype=np.int64)

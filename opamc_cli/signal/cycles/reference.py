@@ -23,7 +23,19 @@ def find_reference(
     Small segments that are not in every cycle hide the repetition: where the others, looked at
     alone, tell more of themselves, theirs is the cycle.
 
-    Of segments in time order, at least one; half-open (start, stop) of the first full cycle.
+    Parameters
+    ----------
+    segments
+        In time order, at least one.
+    rule
+        As for `identify`.
+    segments_per_cycle
+        Motions in a cycle, where known.
+
+    Returns
+    -------
+    tuple of int
+        Half-open interval (start, stop) of segments: the first full cycle.
     """
     found = _repeating(segments, rule, segments_per_cycle)
     large = np.flatnonzero(~small(segments, segments))

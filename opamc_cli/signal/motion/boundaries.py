@@ -32,14 +32,27 @@ def refine_boundaries(
     With one phase only there is no angle near standstill: there the boundary is where the
     current leaves and reaches its standstill value, be it by rotation or by torque.
 
-    The current vector (complex), or a single phase current (real), (n,), A, is that of the motion
-    with the standstill before and after it, up to the middle of the gap to the neighbouring
-    motions, or the recording's ends; at the coarse boundaries, half-open, the joint turns. The
-    noise is the standard deviation in each component, A; `n_to_f_last` are the samples from `start`
-    to where the carrier first was as fast as at `stop`, given if it is still fast there.
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Current vector (complex), or a single phase current (real), of the motion with the
+        standstill before and after it, up to the middle of the gap to the neighbouring motions,
+        or the recording's ends.
+    start, stop : int
+        Coarse boundaries within `current`, half-open; the joint turns at both.
+    fs_hz : float
+        Sampling rate, Hz.
+    noise_a : float
+        Standard deviation of the noise in each component of `current`, A.
+    n_to_f_last : int or None
+        Samples from `start` to where the carrier first was as fast as at `stop`; given if it is
+        still fast there.
 
-    Boundaries never move inwards; one with too little standstill beside it to compare with is
-    returned as it was.
+    Returns
+    -------
+    tuple of int
+        Refined (start, stop), half-open, start <= the coarse one, stop >= the coarse one. A
+        boundary with too little standstill beside it to compare with is returned as it was.
     """
     middle = (start + stop) // 2
     amplitude_a = float(np.median(np.abs(current[start:stop])))

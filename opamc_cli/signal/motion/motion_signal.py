@@ -58,9 +58,21 @@ class MotionStream:
 
     S(t) = max over the scales of abs(CWT(TFS)), equation (3-1) of the thesis, and the frequency
     where the maximum is. Blocks overlap by five standard deviations of the longest wavelet; edge
-    rule: even reflection at the recording's ends. Memory does not grow with the recording, and the
-    result does not depend on how the pieces were cut. A frame is `step` samples, a block so many at
-    least. The engine "ssqueezepy" is some hundred times slower than "band-limited".
+    rule: even reflection at the recording's ends. Memory does not grow with the recording, and
+    the result does not depend on how the pieces were cut.
+
+    Parameters
+    ----------
+    band : MotionBand
+        Frequencies and wavelet.
+    fs_hz : float
+        Sampling rate, Hz.
+    step : int
+        Samples between frames.
+    block : int
+        Samples per internal block, at least; changes the result only by rounding.
+    engine : {"band-limited", "ssqueezepy"}
+        What computes the transform; the second is some hundred times slower.
     """
 
     def __init__(

@@ -14,8 +14,15 @@ def noise_level(current: NDArray[np.inexact]) -> float:
     quietest tenth of short blocks is where the robot stands or turns slowest. If it never does,
     the result is too large, by what the carrier leaves over.
 
-    Of a current vector (complex) or phase current (real), (n,), A, NaN passed over; 0 for fewer
-    than 4 samples.
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Current vector (complex) or phase current (real); NaN is passed over.
+
+    Returns
+    -------
+    float
+        Standard deviation, A; 0 for fewer than 4 samples.
     """
     known = current[np.isfinite(current)]
     difference = np.diff(known, 3)

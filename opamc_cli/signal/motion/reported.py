@@ -42,7 +42,15 @@ class JointMotion:
 def unwrapped(position_rad: NDArray[np.floating]) -> NDArray[np.float64]:
     """Undo an angle's jumps by a whole turn.
 
-    Of a joint, (n,), rad, NaN where unknown; the same to the last digit where nothing jumps.
+    Parameters
+    ----------
+    position_rad : array, shape (n,), rad
+        Joint angle; NaN where unknown.
+
+    Returns
+    -------
+    array, shape (n,), rad
+        The same to the last digit where nothing jumps.
     """
     angle = np.array(position_rad, dtype=np.float64)
     # one missing angle would spoil every angle behind it
@@ -56,9 +64,22 @@ def velocity_from_position(
 ) -> NDArray[np.float64]:
     """Velocity from position by local parabolas, since differences of quantised angles are noise.
 
-    Of an angle, (n,), rad, whose jumps by a whole turn are undone; rad/s, zero for fewer than three
-    samples, NaN if no angle is known.
+    Parameters
+    ----------
+    position_rad : array, shape (n,), rad
+        Joint angle; jumps by a whole turn are undone.
+    fs_hz : float
+        Sampling rate, Hz.
+    window_s : float
+        Length of the local fit, s.
 
+    Returns
+    -------
+    array, shape (n,), rad/s
+        Zero for fewer than three samples, NaN if no angle is known.
+
+    Notes
+    -----
     Savitzky and Golay, 1964. Edge rule: the first and the last parabola are evaluated up to the
     ends. NaN rule: missing angles are bridged by a straight line.
     """
@@ -89,9 +110,19 @@ drive becomes a motion of its own."""
 def quiet_velocity(position_rad: NDArray[np.floating], fs_hz: float) -> NDArray[np.float64]:
     """Velocity whose noise does not hide the slow parts of a motion.
 
-    Of an angle, (n,), rad, as `velocity_from_position`, its window doubled from 0.05 s until four
-    standard deviations of the noise are below what counts as standstill, or to `SLOWEST_WINDOW_S`.
-    Otherwise a slow part of a program is a motion in one recording and none in the next.
+    Parameters
+    ----------
+    position_rad : array, shape (n,), rad
+        Joint angle.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    array, shape (n,), rad/s
+        As `velocity_from_position`, its window doubled from 0.05 s until four standard deviations
+        of the noise are below what counts as standstill, or to `SLOWEST_WINDOW_S`. Otherwise a
+        slow part of a program is a motion in one recording and none in the next.
     """
     window_s = 0.05
     while True:
@@ -131,10 +162,23 @@ def find_joint_motions(
     above 2 % of it, or above four standard deviations of the velocity's noise if that is more. What
     follows it before a standstill and goes 2 % of its way at most is its settling, and no motion.
 
-    Of a velocity, (n,), rad/s, NaN counts as standstill. Shorter motions, and those of fewer than
-    `FEWEST_SAMPLES`, are dropped; shorter standstills between motions of the same direction
-    bridged. A joint that never reaches the least speed stands still: what is left is its
-    controller's quiver. Motions are in order and do not overlap.
+    Parameters
+    ----------
+    velocity_rad_s : array, shape (n,), rad/s
+        Joint velocity; NaN counts as standstill.
+    fs_hz : float
+        Sampling rate, Hz.
+    min_motion_s, min_still_s : float
+        Shorter motions, and those of fewer than `FEWEST_SAMPLES`, are dropped; shorter
+        standstills between motions of the same direction bridged, s.
+    min_speed_rad_s : float
+        A joint that never reaches this speed stands still: what is left is its controller's
+        quiver, rad/s.
+
+    Returns
+    -------
+    list of JointMotion
+        In order, not overlapping.
     """
     velocity = np.nan_to_num(np.asarray(velocity_rad_s, dtype=np.float64))
     if not velocity.size:
@@ -190,8 +234,18 @@ def _probe(velocity: NDArray[np.float64]) -> NDArray[np.float64]:
 def motor_frequency(speed_rad_s: float, gear_ratio: float | None, pole_pairs: int | None) -> float:
     """Frequency that takes the carrier's place for a reported current, Hz.
 
-    With gear ratio and pole pairs it is the electrical frequency; without pole pairs, the motor's
-    revolutions; with neither, the joint's own revolutions per second.
+    Parameters
+    ----------
+    speed_rad_s : float
+        Joint speed, rad/s.
+    gear_ratio, pole_pairs : number or None
+        Of the joint. With both, the result is the electrical frequency; without pole pairs, the
+        motor's revolutions; with neither, the joint's own revolutions per second.
+
+    Returns
+    -------
+    float
+        Hz.
     """
     return speed_rad_s / (2 * np.pi) * (gear_ratio or 1.0) * (pole_pairs or 1)
 
@@ -199,9 +253,18 @@ def motor_frequency(speed_rad_s: float, gear_ratio: float | None, pole_pairs: in
 def fluctuation_frequency(current: NDArray[np.floating], fs_hz: float) -> float:
     """Frequency of a current's own fluctuations, where no carrier tells how fast they are.
 
-    Of one motion's envelope, (n,), NaN bridged by a straight line; at most a quarter of the
-    sampling rate: the first zero of the autocorrelation, its straight line taken off before, is a
-    quarter of the period.
+    Parameters
+    ----------
+    current : array, shape (n,)
+        Envelope of one motion; NaN is bridged by a straight line.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    float
+        Hz, at most a quarter of the sampling rate: the first zero of the autocorrelation, its
+        straight line taken off before, is a quarter of the period.
     """
     x = np.asarray(current, dtype=np.float64)
     known = np.flatnonzero(np.isfinite(x))

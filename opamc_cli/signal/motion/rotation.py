@@ -58,7 +58,13 @@ class Rotation:
 
 
 class RotationStream:
-    """Rotation of a current vector that arrives in pieces; does not depend on how it was cut."""
+    """Rotation of a current vector that arrives in pieces; does not depend on how it was cut.
+
+    Parameters
+    ----------
+    step : int
+        Samples per frame.
+    """
 
     def __init__(self, step: int) -> None:
         self._step = step
@@ -103,8 +109,21 @@ def turning_parts(
     Noise and a torque that changes sign win or lose half turns where the current is small: there
     its neighbours tell.
 
-    Of a vector, (n,), A, NaN passed over, that turns at `f_max_hz` > 0 at most; the means of its
-    parts, (k,), A, and the turns of the vector in each, (k,), smoothed, negative backwards.
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Current vector; NaN are passed over.
+    f_max_hz : float
+        Highest frequency at which it turns, > 0, Hz.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    parts : array, shape (k,), A
+        Means of the vector.
+    turns : array, shape (k,)
+        Of the vector in each, smoothed; negative backwards.
     """
     z = z[np.isfinite(z)]
     length = max(1, int(fs_hz / (PARTS_OF_A_TURN * f_max_hz)))

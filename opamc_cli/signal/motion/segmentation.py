@@ -87,8 +87,17 @@ class Evidence:
 def hysteresis(strength: NDArray[np.floating], on: float, off: float) -> list[tuple[int, int]]:
     """Half-open intervals that stay above `off` and reach `on` somewhere.
 
-    Of a motion signal, or any other evidence of motion, (n,), and thresholds off <= on; a value
-    equal to a threshold counts as above it, NaN as below. Intervals are in order and do not touch.
+    Parameters
+    ----------
+    strength : array, shape (n,)
+        Motion signal, or any other evidence of motion.
+    on, off : float
+        Thresholds, off <= on; a value equal to a threshold counts as above it, NaN as below.
+
+    Returns
+    -------
+    list of (first, last)
+        In order, not touching.
     """
     above = np.concatenate([[False], strength >= off, [False]])
     edges = np.flatnonzero(above[1:] != above[:-1])
@@ -105,7 +114,17 @@ def hysteresis(strength: NDArray[np.floating], on: float, off: float) -> list[tu
 def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
     """Motions of one axis.
 
-    In order, not overlapping.
+    Parameters
+    ----------
+    evidence : Evidence
+        Motion signal, ridge and rotation.
+    rule : MotionRule
+        Thresholds and durations.
+
+    Returns
+    -------
+    list of Motion
+        In order, not overlapping.
     """
     clear = clear_motion(evidence, rule)
 
@@ -173,8 +192,19 @@ def largest_frequency(ridge_hz: NDArray[np.floating], n_lasting: int = 5) -> flo
     """Largest frequency that lasts, of the ridge where the motion is clear.
 
     A single frame may jump to a harmonic or to noise while the current passes zero; the median of
-    its neighbours does not follow it. Of the ridge in frames of clear motion, (n,), Hz; 0 for no
-    frame at all.
+    its neighbours does not follow it.
+
+    Parameters
+    ----------
+    ridge_hz : array, shape (n,)
+        Ridge in frames of clear motion, Hz.
+    n_lasting : int
+        Frames over which the median is taken.
+
+    Returns
+    -------
+    float
+        Hz; 0 for no frame at all.
     """
     if not ridge_hz.size:
         return 0.0

@@ -41,15 +41,27 @@ LEAST_SPEED_RAD_S = 0.01
 def lacks_sign(current: NDArray[np.floating], velocity_rad_s: NDArray[np.floating]) -> bool | None:
     """Tell whether a current was logged without its sign.
 
-    Of a reported current, (n,), A, and the joint's velocity, (n,), rad/s. False where it has both
-    signs, the joint does not reverse, it never comes near zero, or it accelerates or rests as under
-    a load. None where the joint reverses under a current of one sign and neither tells.
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Reported current.
+    velocity_rad_s : array, shape (n,), rad/s
+        Joint velocity.
 
-    Inertia draws current along the acceleration, its modulus along the speed's growth; a joint that
-    a position loop holds against its own friction may draw as much at rest as on its way, so rest
-    is asked only where the acceleration does not tell. Friction draws current either way, so that
-    its modulus is larger in both directions than at rest; a constant load that outweighs friction
-    adds to one direction what it takes off the other.
+    Returns
+    -------
+    bool or None
+        False where it has both signs, the joint does not reverse, it never comes near zero, or it
+        accelerates or rests as under a load. None where the joint reverses under a current of one
+        sign and neither tells.
+
+    Notes
+    -----
+    Inertia draws current along the acceleration, its modulus along the speed's growth; a joint
+    that a position loop holds against its own friction may draw as much at rest as on its way, so
+    rest is asked only where the acceleration does not tell. Friction draws current either way, so
+    that its modulus is larger in both directions than at rest; a constant load that outweighs
+    friction adds to one direction what it takes off the other.
     """
     x = np.asarray(current, dtype=np.float64)
     v = np.asarray(velocity_rad_s, dtype=np.float64)
@@ -124,8 +136,18 @@ def signed_by_speed(
 ) -> NDArray[np.float64]:
     """Give a current that was logged without its sign that of the speed.
 
-    Of a current that `lacks_sign`, (n,), A, and a velocity, (n,), rad/s: fading to zero where the
-    joint stands. While it brakes it may draw current against its speed: there the sign is wrong.
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Reported current that `lacks_sign`.
+    velocity_rad_s : array, shape (n,), rad/s
+        Joint velocity.
+
+    Returns
+    -------
+    array, shape (n,), A
+        Fading to zero where the joint stands. While it brakes it may draw current against its
+        speed: there the sign is wrong.
     """
     x = np.abs(np.asarray(current, dtype=np.float64))
     v = np.asarray(velocity_rad_s, dtype=np.float64)
@@ -138,9 +160,18 @@ def friction_drives(
 ) -> bool:
     """Tell whether a current was logged with the opposite sign of the motion.
 
-    Of each recording's signed current, (n,), A, and joint angle, (n,), rad: true where friction,
-    fitted beside gravity, inertia and a constant, drives the joint, by four times its error over
-    eight blocks of time. False where it does not move both ways.
+    Parameters
+    ----------
+    recordings : sequence of pairs of arrays, shape (n,) each, A and rad
+        Signed current and joint angle of each recording.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    bool
+        True where friction, fitted beside gravity, inertia and a constant, drives the joint, by
+        four times its error over eight blocks of time. False where it does not move both ways.
     """
     designs, currents = zip(*(_rigid(*one, fs_hz) for one in recordings), strict=True)
     design, x = np.concatenate(designs), np.concatenate(currents)

@@ -147,8 +147,19 @@ def blurred(
 def less_late(logged: Floats, velocity: Floats, acceleration: Floats, rate_hz: float) -> Floats:
     """Take the lag of a drive's filter off a logged speed, if the position's own shows one.
 
-    All are of shape (n,), velocity and acceleration as the position tells; of first order, the
-    logged speed itself where no lag explains what both differ by.
+    Parameters
+    ----------
+    logged, velocity : arrays of shape (n,)
+        Speeds, as logged and as the position tells.
+    acceleration : array of shape (n,)
+        As the position tells.
+    rate_hz
+        Sampling rate.
+
+    Returns
+    -------
+    array of shape (n,)
+        Of first order; the logged speed itself where no lag explains what both differ by.
     """
     lead = velocity - logged
     lag_s = float(lead @ acceleration) / max(float(acceleration @ acceleration), 1e-300)

@@ -13,10 +13,26 @@ def carrier_windows(
 ) -> list[tuple[int, int]]:
     """Cut an interval into windows of equal length, each a whole number of carrier periods.
 
-    Whole periods, since a window that ends within a period holds some ordinal patterns once more
-    than others. Half-open as the interval, in samples, in order and not overlapping; fewer than
-    asked rather than shorter than the least, none if not one period fits. The carrier is above 0
-    Hz.
+    Whole periods, since a window that ends within a period holds some ordinal patterns once
+    more than others.
+
+    Parameters
+    ----------
+    start, stop : int
+        Interval to cut, samples, half-open.
+    f_carrier_hz : float
+        Carrier frequency, > 0, Hz.
+    fs_hz : float
+        Sampling rate, Hz.
+    n_windows : int
+        Windows wanted, at least 1.
+    min_samples : int
+        Fewer windows are made rather than shorter ones than this.
+
+    Returns
+    -------
+    list of (start, stop)
+        In order, not overlapping, half-open; empty if not one carrier period fits.
     """
     n = max(1, min(n_windows, (stop - start) // max(1, min_samples)))
     period = fs_hz / f_carrier_hz

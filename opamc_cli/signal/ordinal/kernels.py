@@ -18,7 +18,17 @@ N_TABLES = 4  # equal codes in a row would wait for each other's increment in a 
 def count_codes(x: NDArray[np.floating], order: int, tau: int) -> NDArray[np.int64]:
     """Count all patterns of `x`, which holds no NaN and at least one pattern.
 
-    Contiguous, (n,), float32 or float64, of order 2..7; the count of each code, (α!,).
+    Parameters
+    ----------
+    x : array, shape (n,), contiguous, float32 or float64
+        Samples.
+    order, tau : int
+        Order 2..7 and delay in samples.
+
+    Returns
+    -------
+    array of int64, shape (α!,)
+        Count of each code.
     """
     # Order 5 has 120 codes: bytes hold them and twice as many fit a vector register.
     code_type = np.uint8 if order <= 5 else np.uint16

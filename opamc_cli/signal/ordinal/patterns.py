@@ -15,14 +15,32 @@ MAX_ORDER = 7
 def time_delay(fs_hz: float, f_max_hz: float, order: int, gamma: float = 2.0) -> int:
     """Delay τ between the elements of a pattern, so that it spans γ carrier periods.
 
-    Halves round up, as in the toolbox of the source; the result is at least 1. Rate, frequency (the
-    largest fundamental one of the motion) and γ are above 0, the order α is 2..7, and (α-1)τ is the
-    window. Equation (4-2) of the thesis.
+    Halves round up, as in the toolbox of the source; the result is at least 1.
+
+    Parameters
+    ----------
+    fs_hz : float
+        Sampling rate, > 0, Hz.
+    f_max_hz : float
+        Largest fundamental frequency of the motion, > 0, Hz.
+    order : int
+        Order α of the pattern, 2..7.
+    gamma : float
+        Carrier periods that the window (α-1)τ spans, > 0.
+
+    Returns
+    -------
+    int
+        τ in samples, at least 1.
 
     Raises
     ------
     ValueError
         If a rate, a frequency or γ is not positive and finite, or the order is out of range.
+
+    Notes
+    -----
+    Equation (4-2) of the thesis.
 
     Examples
     --------
@@ -47,12 +65,24 @@ def ordinal_counts(
 ) -> dict[int, NDArray[np.int64]]:
     """Count the ordinal patterns of every order asked for.
 
-    Ties keep time order (the earlier of two equal values counts as the smaller one). A pattern that
-    touches a NaN is not counted; how many there were is `n_windows(x.size, order, tau)` less the
-    sum of the counts. Infinities are ordered like any other value. A series too short for one
-    pattern gives zeros. Of samples, (n,), float32 or float64, equally spaced, orders 2..7 and a
-    delay of at least 1 sample: by order the count of each code, (α!,), see `pattern_of_code` for
-    its meaning.
+    Ties keep time order (the earlier of two equal values counts as the smaller one). A pattern
+    that touches a NaN is not counted; how many there were is `n_windows(x.size, order, tau)`
+    less the sum of the counts. Infinities are ordered like any other value. A series too short
+    for one pattern gives zeros.
+
+    Parameters
+    ----------
+    x : array, shape (n,), float32 or float64
+        Equally spaced samples, any unit.
+    orders : iterable of int
+        Orders α, each 2..7.
+    tau : int
+        Delay between the elements of a pattern, samples, at least 1.
+
+    Returns
+    -------
+    dict of int to array of int64, shape (α!,)
+        For every order the count of each code; see `pattern_of_code` for a code's meaning.
 
     Raises
     ------
@@ -88,14 +118,28 @@ def ordinal_counts(
 def ordinal_codes(x: NDArray[np.floating], order: int, tau: int) -> NDArray[np.int16]:
     """Code of the pattern that starts at each sample.
 
-    Of samples, (n,), equally spaced, order α of 2..7 and a delay of at least 1 sample: (max(0, n -
-    (α-1)τ),), 0 .. α!-1, or -1 where the pattern touches a NaN. Ties keep time order. Equation
-    (2-6) of the thesis.
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Equally spaced samples, any unit.
+    order : int
+        Order α, 2..7.
+    tau : int
+        Delay, samples, at least 1.
+
+    Returns
+    -------
+    array of int16, shape (max(0, n - (α-1)τ),)
+        Codes 0 .. α!-1, or -1 where the pattern touches a NaN. Ties keep time order.
 
     Raises
     ------
     ValueError
         If `x` is not one-dimensional, τ is below 1, or the order is out of range.
+
+    Notes
+    -----
+    Equation (2-6) of the thesis.
     """
     _check_order(order)
     samples = _series(x, tau)
@@ -109,13 +153,27 @@ def ordinal_codes(x: NDArray[np.floating], order: int, tau: int) -> NDArray[np.i
 def pattern_of_code(code: int, order: int) -> tuple[int, ...]:
     """Permutation (r_1, …, r_α) that sorts the pattern ascending, counted from 1.
 
-    Of a code 0 .. α!-1 and an order α of 2..7. Equation (2-6) of the thesis, with r = 1 for y_t
-    itself: its index runs one too far, as its own worked example shows.
+    Parameters
+    ----------
+    code : int
+        0 .. α!-1, as counted by `ordinal_counts`.
+    order : int
+        Order α, 2..7.
+
+    Returns
+    -------
+    tuple of int, length α
+        The positions of the elements from the smallest to the largest.
 
     Raises
     ------
     ValueError
         If the code or the order is out of range.
+
+    Notes
+    -----
+    Equation (2-6) of the thesis, with r = 1 for y_t itself: its index runs one too far, as its
+    own worked example shows.
 
     Examples
     --------

@@ -30,9 +30,18 @@ def apart(
 ) -> float | None:
     """How far a logged speed is from its position's, if no sensor has measured it.
 
-    As logged, (n,) each, gaps bridged: the standard deviation of what both differ by, of the root
-    mean square of the speed, where that is more than filters and noise make of one speed; None
-    where it may be the joint's own.
+    Parameters
+    ----------
+    position_rad, velocity_rad_s : arrays of shape (n,)
+        As logged; gaps are bridged.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    float or None
+        Standard deviation of what both differ by, of the root mean square of the speed, where that
+        is more than filters and noise make of one speed; None where it may be the joint's own.
     """
     position, logged = filled(position_rad), filled(velocity_rad_s)
     window = smoothing_window(position, rate_hz)

@@ -43,9 +43,18 @@ class Leaps:
 def leaps(position: Floats) -> Leaps | None:
     """Tell whether an angle leaps on its way.
 
-    Of a joint, (n,); jumps by a whole turn of 2π are none. None where it does not, or steps are too
-    uneven to tell.
+    Parameters
+    ----------
+    position : array, shape (n,)
+        Joint angle; jumps by a whole turn of 2π are none.
 
+    Returns
+    -------
+    Leaps or None
+        None where it does not, or steps are too uneven to tell.
+
+    Notes
+    -----
     Steps are held against the median of nine and against both neighbours, so that a missing sample
     looks like a step twice as large as those beside it. Where as many values are held, samples came
     late and none is missing.

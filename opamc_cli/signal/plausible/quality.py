@@ -20,8 +20,17 @@ def clipped_share(x: NDArray[np.floating]) -> float:
     """Share of the samples that sit at the channel's largest or smallest value, if it is clipped.
 
     A clipped channel reaches its extreme value far more often than the next value inside; a
-    quantised crest does not. A current that rests at exactly zero is at no limit. NaN is passed
-    over; 0 for a channel, (n,), that does not look clipped.
+    quantised crest does not. A current that rests at exactly zero is at no limit.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Samples of one channel; NaN is passed over.
+
+    Returns
+    -------
+    float
+        0 for a channel that does not look clipped.
     """
     known = x[np.isfinite(x)]
     if known.size < 2:
@@ -41,8 +50,15 @@ def clipped_share(x: NDArray[np.floating]) -> float:
 def bridged(x: NDArray[np.floating]) -> NDArray[np.floating]:
     """Fill short gaps with a straight line between what is known.
 
-    Of one motion, (n,), NaN where unknown; gaps of more than `MOST_BRIDGED` samples, and those at
-    an end, are left.
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Samples of one motion; NaN where unknown.
+
+    Returns
+    -------
+    array, shape (n,)
+        Gaps of more than `MOST_BRIDGED` samples, and those at an end, are left.
     """
     known = np.flatnonzero(np.isfinite(x))
     if known.size in (0, x.size):
@@ -62,6 +78,11 @@ def held_for(x: NDArray[np.floating]) -> int | None:
     A channel that a bus brings less often than the logger writes a row keeps its last value until
     then: its changes come at one distance, and are of many sizes. A coarse encoder at an even speed
     changes at one distance, too, but by its one step.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Samples of one channel, as logged.
     """
     step = np.diff(x)
     change = np.flatnonzero(step)  # NaN is one
@@ -184,8 +205,17 @@ class Size:
 def spikes(values: NDArray[np.floating], limit: Limit) -> NDArray[np.intp]:
     """Return which samples are beyond any joint's and stand out of a log that is right.
 
-    Of one channel, (n,), NaN none: their indices, (k,), ascending; empty where more than `SELDOM`
-    are beyond.
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Samples of one channel; NaN is none.
+    limit
+        What they are held against.
+
+    Returns
+    -------
+    array of int, shape (k,)
+        Their indices, ascending; empty where more than `SELDOM` are beyond.
     """
     none = np.zeros(0, dtype=np.intp)
     extremes = (np.fmax.reduce(values, initial=0.0), np.fmin.reduce(values, initial=0.0))

@@ -100,9 +100,22 @@ def follows(
 ) -> int | None:
     """Tell which other joint's motion the friction in a current is of.
 
-    Of its signed current, (n,), A, and joint angles by axis, (n,), rad, its own among them; None
-    where it is its own, or nobody's. Gravity and inertia of all joints are fitted beside: a joint
-    carries and moves others, too.
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Signed current of a joint.
+    positions : dict of int to array, shape (n,), rad
+        Joint angles by axis, its own among them.
+    axis : int
+        Its own axis.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    int or None
+        None where it is its own, or nobody's. Gravity and inertia of all joints are fitted beside:
+        a joint carries and moves others, too.
     """
     x = averaged(current, fs_hz)
     of = {other: parts(position, fs_hz) for other, position in positions.items()}
@@ -122,10 +135,19 @@ def follows(
 def lags(current: Floats, position_rad: Floats, fs_hz: float) -> list[float] | None:
     """Tell by how much a current's clock differs from that of the motion, at four times.
 
-    Of a joint's signed current, A or Nm, and its angle, (n,): by which the position is logged later
-    than the current, s, in each of four stretches of equal motion. None where the two clocks are
-    one, the basic parts tell no delay, or the shortest delay that can be told is less than
-    `DRIFTED_S`.
+    Parameters
+    ----------
+    current, position_rad : array, shape (n,)
+        Signed current of a joint, A or Nm, and its angle.
+    fs_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    list of float, s, or None
+        By which the position is logged later than the current, in each of four stretches of equal
+        motion. None where the two clocks are one, the basic parts tell no delay, or the shortest
+        delay that can be told is less than `DRIFTED_S`.
     """
     x = averaged(current, fs_hz)
     friction, inertia, gravity = parts(position_rad, fs_hz)
@@ -183,8 +205,16 @@ def _certain(
 def other_scale(current: Floats, position_rad: Floats, fs_hz: float) -> float | None:
     """Tell how many times as large an angle is by the gravity in a current.
 
-    Of the same as `lags`. None where the angle's own scale tells as much, to a fifth of the square
-    left, or no robot's joint turned as far or as fast in the other.
+    Parameters
+    ----------
+    current, position_rad, fs_hz
+        As of `lags`.
+
+    Returns
+    -------
+    float or None
+        None where the angle's own scale tells as much, to a fifth of the square left, or no robot's
+        joint turned as far or as fast in the other.
     """
     x = averaged(current, fs_hz)
     friction, inertia, gravity = parts(position_rad, fs_hz)

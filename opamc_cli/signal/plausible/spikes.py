@@ -18,7 +18,15 @@ FEWEST = 3
 def spikes(values: Floats) -> NDArray[np.int64]:
     """Find single samples that lie far from those on either side, which agree.
 
-    Of any channel, (n,), NaN where unknown; none where there are fewer than three.
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Any channel; NaN where unknown.
+
+    Returns
+    -------
+    ndarray of int
+        Their indices; none where there are fewer than three.
     """
     if values.size < 3:
         return np.zeros(0, dtype=np.int64)

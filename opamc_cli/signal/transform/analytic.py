@@ -16,10 +16,19 @@ def clarke(
 ) -> NDArray[np.complexfloating]:
     """Combine three phase currents into the current vector, their exact analytic signal.
 
-    Of phase currents, (n,), A; what is common to all three is dropped. Complex64 for float32 input,
-    else complex128; its modulus is the amplitude of balanced phases, its angle grows when the
-    phases follow each other in the order a, b, c.
+    Parameters
+    ----------
+    a, b, c : array, shape (n,), A
+        Phase currents. What is common to all three is dropped.
 
+    Returns
+    -------
+    array, shape (n,), A
+        Complex64 for float32 input, else complex128. Its modulus is the amplitude of balanced
+        phases; its angle grows when the phases follow each other in the order a, b, c.
+
+    Notes
+    -----
     c = (2/3)(a + b·e^{+i2π/3} + c·e^{-i2π/3}), the amplitude-invariant Clarke transform.
     """
     a, b, c = np.asarray(a), np.asarray(b), np.asarray(c)
@@ -37,9 +46,22 @@ def clarke(
 def analytic_signal(x: NDArray[np.floating]) -> NDArray[np.complexfloating]:
     """Analytic signal x + i·HT[x] of one segment.
 
-    Edge rule: the segment is continued by its even reflection on both sides, up to a length that
-    the FFT likes, so that neither end sees the other. A mean stays in the real part. Of one phase
-    current, (n,), A; complex64 for float32 input, else complex128. Equation (2-2) of the thesis.
+    Edge rule: the segment is continued by its even reflection on both sides, up to a length
+    that the FFT likes, so that neither end sees the other. A mean stays in the real part.
+
+    Parameters
+    ----------
+    x : array, shape (n,), A
+        One phase current.
+
+    Returns
+    -------
+    array, shape (n,), A
+        Complex64 for float32 input, else complex128.
+
+    Notes
+    -----
+    Equation (2-2) of the thesis.
     """
     x = np.asarray(x)
     n = x.size
@@ -59,9 +81,21 @@ class AnalyticStream:
     """Analytic signal of one phase current that arrives in pieces.
 
     The Hilbert transform is a finite filter (Blackman window), so that no sample depends on
-    anything further away than its half length, nor on how the pieces were cut. Below `f_min_hz` it
-    fades out: a constant stays in the real part. Edge rule: even reflection. A block is `core`
-    samples, which changes the result by rounding only. Equation (2-2) of the thesis.
+    anything further away than its half length, nor on how the pieces were cut. Below `f_min_hz`
+    it fades out: a constant stays in the real part. Edge rule: even reflection.
+
+    Parameters
+    ----------
+    fs_hz : float
+        Sampling rate, Hz.
+    f_min_hz : float
+        Lowest carrier frequency that must come out whole, Hz.
+    core : int
+        Samples per internal block; does not change the result beyond rounding.
+
+    Notes
+    -----
+    Equation (2-2) of the thesis.
     """
 
     def __init__(self, fs_hz: float, f_min_hz: float, core: int = 1 << 15) -> None:
@@ -98,7 +132,15 @@ class AnalyticStream:
 def envelope(z: NDArray[np.complexfloating]) -> NDArray[np.floating]:
     """Envelope a(t) = abs(z), proportional to torque; equation (2-3) of the thesis.
 
-    Of an analytic signal, (n,), A; float32 for complex64 input, else float64.
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Analytic signal.
+
+    Returns
+    -------
+    array, shape (n,), A
+        Float32 for complex64 input, else float64.
     """
     # Written out: abs() guards against overflow, which currents do not need, at five times the
     # cost.
@@ -115,8 +157,21 @@ def temporal_fine_structure(
     would look like motion: there the vector is divided by the floor instead of its modulus, so
     that the result fades with the current.
 
-    Of an analytic signal, (n,), A, NaN gives 0; in -1..1, float32 for complex64 input, else
-    float64. Equations (2-4) and (2-5) of the thesis; the floor, A, is ours.
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Analytic signal; NaN gives 0.
+    floor_a : float
+        Noise floor of the modulus, A, >= 0.
+
+    Returns
+    -------
+    array, shape (n,), in -1..1
+        Float32 for complex64 input, else float64.
+
+    Notes
+    -----
+    Equations (2-4) and (2-5) of the thesis; the floor is ours.
     """
     z = np.ascontiguousarray(z)
     real = np.float32 if z.dtype == np.complex64 else np.float64

@@ -25,6 +25,13 @@ class OverlappingBlocks:
 
     Block i carries the samples from i·core - overlap to (i+1)·core + overlap. Edge rule: before
     the first and after the last sample the stream is continued by its even reflection.
+
+    Parameters
+    ----------
+    core : int
+        Samples by which successive blocks advance, at least 1.
+    overlap : int
+        Samples of context on each side, at least 0.
     """
 
     def __init__(self, core: int, overlap: int) -> None:

@@ -15,8 +15,16 @@ one by one by ten, 70 by eight by a quarter, 70 by 70 not at all (`benchmarks/ke
 def products_over(ranges: Ints, left: Floats, right: Floats) -> Floats:
     """Sum ``left.T @ right`` over each of some ranges.
 
-    Ranges, (p, 2), are half-open, of samples that both have; signals lie side by side, (n, k) and
-    (n, m), fastest where each is contiguous: (p, k, m).
+    Parameters
+    ----------
+    ranges : int array of shape (p, 2)
+        Half-open, of samples that both have.
+    left, right : arrays of shape (n, k) and (n, m)
+        Signals side by side; fastest where each is contiguous.
+
+    Returns
+    -------
+    array of shape (p, k, m)
     """
     if left.shape[1] < right.shape[1]:
         return np.swapaxes(products_over(ranges, right, left), 1, 2)

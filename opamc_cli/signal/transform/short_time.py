@@ -12,12 +12,28 @@ def short_time_log_power(
 ) -> NDArray[np.float32]:
     """Log power of the lowest frequencies in overlapping frames of a signal.
 
-    Frames are equally long, overlap by half, cover the signal from end to end, lose their mean and
-    are tapered by a Hann window. Bin k is k + 1 periods per frame. A signal too short for frames of
-    `2 * n_bins` samples has fewer frames, in the end one with fewer bins. Of one motion's envelope,
-    (n,), A: natural logarithm of the power in A², (frames, bins), no rows for fewer than four
-    samples; a frame that holds NaN gives NaN. P. D. Welch, IEEE Trans. Audio Electroacoust. 15
-    (1967); here frames are not averaged, so that they tell where in the motion something changes.
+    Frames are equally long, overlap by half, cover the signal from end to end, lose their mean
+    and are tapered by a Hann window. Bin k is k + 1 periods per frame. A signal too short for
+    frames of `2 * n_bins` samples has fewer frames, in the end one with fewer bins.
+
+    Parameters
+    ----------
+    x : array, shape (n,), A
+        One motion's envelope; a frame that holds NaN gives NaN.
+    n_frames : int
+        Frames, at least 1.
+    n_bins : int
+        Bins, at least 1.
+
+    Returns
+    -------
+    array of float32, shape (frames, bins)
+        Natural logarithm of the power in A²; no rows for fewer than four samples.
+
+    Notes
+    -----
+    P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967); here frames are not averaged, so
+    that they tell where in the motion something changes.
 
     Examples
     --------

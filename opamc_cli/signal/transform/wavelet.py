@@ -16,9 +16,17 @@ CUTOFF = 1e-5
 class Morse:
     """A generalised Morse wavelet.
 
-    With symmetry γ > 0, 3 the most symmetric, and β > 0; the time-bandwidth product is β·γ. The
-    source's toolbox default is a product of 60, so β = 20; ssqueezepy's default is β = 60, a longer
-    wavelet. Olhede and Walden, 2002; Lilly and Olhede, 2009.
+    Attributes
+    ----------
+    gamma : float
+        Symmetry γ, > 0; 3 is the most symmetric.
+    beta : float
+        β, > 0; the time-bandwidth product is β·γ. The source's toolbox default is a product of
+        60, so β = 20; ssqueezepy's default is β = 60, a longer wavelet.
+
+    Notes
+    -----
+    Olhede and Walden, 2002; Lilly and Olhede, 2009.
     """
 
     gamma: float = 3.0
@@ -79,9 +87,21 @@ class FilterBank:
 
     Each filter lives in a narrow band: outside it nothing is multiplied. Only every `step`-th
     output is wanted: folding the band's bins modulo length/step before a short inverse FFT gives
-    exactly these, since decimation in time is folding in frequency. Together this is some hundred
-    times less work than a full-length inverse FFT per scale. Peak frequencies, (n_scales,), ascend
-    below half the sampling rate; a block's length is a multiple of `step`.
+    exactly these, since decimation in time is folding in frequency. Together this is some
+    hundred times less work than a full-length inverse FFT per scale.
+
+    Parameters
+    ----------
+    wavelet : Morse
+        The wavelet.
+    frequencies_hz : array, shape (n_scales,)
+        Peak frequencies, ascending, below half the sampling rate.
+    fs_hz : float
+        Sampling rate, Hz.
+    length : int
+        Samples per block, a multiple of `step`.
+    step : int
+        Samples between outputs.
     """
 
     def __init__(
@@ -113,8 +133,15 @@ class FilterBank:
     def transform(self, block: NDArray[np.floating]) -> NDArray[np.complex64]:
         """Wavelet transform of a block, at every `step`-th of its samples.
 
-        Taken as periodic, (length,), real; (n_scales, length // step), scales in the order of
-        `frequencies_hz`.
+        Parameters
+        ----------
+        block : array, shape (length,)
+            Real samples; the block is taken as periodic.
+
+        Returns
+        -------
+        array of complex64, shape (n_scales, length // step)
+            Coefficients; scales in the order of `frequencies_hz`.
         """
         # Single precision: the transform of a unit signal is right to 1e-6.
         spectrum = fft.rfft(block.astype(np.float32, copy=False), workers=1)

@@ -111,10 +111,25 @@ def run(
 ) -> IdentifyOutcome:
     """Identify the cycles and motions of a segment table.
 
-    A motion table's reference cycles are taken where one is given; else they are found in these
-    segments, in the named run or, of the runs with the most repetitions, in the one whose cycle
-    most runs hold. `moved_to` are the folders of runs that were moved, `without` run and axis of
-    segments that are left out. Of the options sections `identify` and `patterns.envelope` are used.
+    Parameters
+    ----------
+    segments
+        Table of stage `segment`.
+    config
+        Sections `identify` and `patterns.envelope` are used.
+    out
+        Folder of the motion table.
+    reference
+        Motion table whose reference cycles are taken; None: found in these segments.
+    reference_run
+        Name of the run in which the reference cycle is looked for; None: of the runs with the
+        most repetitions the one whose cycle most runs hold.
+    moved_to
+        Folders of the runs, if they were moved.
+    without
+        Run and axis of segments that are left out.
+    jobs, watch, kept
+        As of `segment.run`.
 
     Raises
     ------

@@ -71,7 +71,18 @@ def run(
 ) -> PatternsOutcome:
     """Count the ordinal patterns of every identified segment's envelope; feed the witnesses.
 
-    Of the options section `patterns` is used; see `identify.run`.
+    Parameters
+    ----------
+    motions
+        Table of stage `identify`.
+    config
+        Section `patterns` is used.
+    out
+        Folder of the tables.
+    moved_to
+        Folders of the runs, if they were moved.
+    jobs, watch, kept
+        As of `segment.run`.
 
     Raises
     ------
@@ -168,9 +179,22 @@ def delay(
 ) -> int | None:
     """Return the time delay of a motion.
 
-    By γ of (4-2), from the frequency of the motion's carrier or of its current's fluctuations, or
-    fixed; in samples, shortened until the window spans no more than `LARGEST_SHARE` of the samples
-    that its reference has, None if even neighbouring ones do not fit.
+    Parameters
+    ----------
+    config
+        A fixed delay, or γ of (4-2).
+    fs_hz, f_max_hz
+        Sampling rate, and frequency of the motion's carrier or of its current's fluctuations.
+    order
+        Of the patterns.
+    samples
+        Of the motion, as its reference has them.
+
+    Returns
+    -------
+    int or None
+        In samples; shortened until the window spans no more than `LARGEST_SHARE` of the motion,
+        None if even neighbouring samples do not fit.
     """
     wanted = config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
     longest = int(LARGEST_SHARE * samples) // (order - 1)

@@ -59,8 +59,16 @@ def run(
 ) -> ScoreOutcome:
     """Compare the target's patterns with the baseline's.
 
-    Both are tables of stage `patterns`; of the options section `score` is used. Without trained
-    discriminants the column `lda` stays empty.
+    Parameters
+    ----------
+    baseline, target
+        Tables of stage `patterns`.
+    config
+        Section `score` is used.
+    out
+        Folder of the two tables.
+    models
+        Trained discriminants; None leaves the column `lda` empty.
 
     Raises
     ------

@@ -82,8 +82,22 @@ def run(
 ) -> SegmentOutcome:
     """Cut runs into motions, axis by axis.
 
-    Of the options sections `segment` and `joint` are used; the result is the same for any number of
-    jobs.
+    Parameters
+    ----------
+    paths
+        Run files and folders of them.
+    config
+        Sections `segment` and `joint` are used.
+    out
+        Folder of the segment table.
+    without
+        Runs that are left out.
+    jobs
+        Worker processes; the result is the same for any number.
+    watch
+        Called as the work gets done.
+    kept
+        Where results of the same work may lie.
 
     Raises
     ------

@@ -51,8 +51,26 @@ def run_chain(
 ) -> ChainOutcome:
     """Run segment, identify and patterns over runs, each stage from the file before it.
 
-    See these for the parameters; `check` is told the segments and returns run and axis of those
-    that go no further, `progress` is called with the name of each stage as it begins.
+    Parameters
+    ----------
+    paths
+        Run files and folders of them.
+    config
+        All options.
+    out
+        Folder of the tables.
+    reference
+        Motion table whose reference cycles are taken; None: found in these runs.
+    without
+        Runs that are left out.
+    check
+        Told the segments, it returns run and axis of those that go no further.
+    jobs
+        Worker processes.
+    kept
+        Where results of the same work may lie.
+    progress
+        Called with the name of each stage as it begins.
 
     Raises
     ------

@@ -44,8 +44,14 @@ def on_each_axis(
 ) -> tuple[list[Result], list[OpamcError], list[tuple[Path, str]]]:
     """Do something with each axis of some runs; return results, what failed, and the runs' hashes.
 
-    The work is importable by name. The axis `own` is meant where none is named and the runs have
-    it.
+    Parameters
+    ----------
+    work : callable
+        Importable by name; model, runs and axis in, what can be pickled out.
+    model, paths, axes, jobs, watch
+        As of `model.fit`.
+    own
+        The axis that is meant where none is named and the runs have it.
 
     Raises
     ------

@@ -115,7 +115,19 @@ def doubts_of(
 ) -> tuple[list[str], list[str]]:
     """Say of a closed loop's names which may stand for something else.
 
-    Returned are what is worth knowing, and which names, or recordings, are rather wrong than right.
+    Parameters
+    ----------
+    laid, runs
+        What was closed.
+    loop, sure
+        What was found, and how certain its coefficients are.
+
+    Returns
+    -------
+    list of str
+        What is worth knowing.
+    list of str
+        Which names, or recordings, are rather wrong than right.
     """
     axis, track = laid.axis, loop.after.dataset.fine.track
     found = {step.term.effect.name for step in loop.steps}

@@ -59,6 +59,13 @@ def evaluate(
 ) -> Outcome:
     """Apply a closed model's frozen coefficients to each axis; writes evaluation.json.
 
+    Parameters
+    ----------
+    model : JointModelConfig
+        As `opamc model close` wrote it.
+    paths, axes, out, jobs, watch
+        As of `model.fit`.
+
     Raises
     ------
     ConfigError

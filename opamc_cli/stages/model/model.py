@@ -82,7 +82,20 @@ def fit(
 ) -> Outcome:
     """Fit a declared model on each axis; writes fit.parquet.
 
-    Without axes on all that the runs share.
+    Parameters
+    ----------
+    model : JointModelConfig
+        Declared model.
+    paths : sequence of (str, Path)
+        Names and files of the runs.
+    axes : sequence of int
+        Axes; empty for all.
+    out : Path
+        Output folder.
+    jobs : int
+        Worker processes; 0: one per core, where they are worth their start.
+    watch : callable
+        Called as axes get done.
     """
     done, errors, inputs = on_each_axis(_fitted, model, paths, axes, jobs, watch)
     rows = [row for _, each in done for row in each]
@@ -164,7 +177,15 @@ def close(
     jobs: int = 1,
     watch: Watch = unwatched,
 ) -> Outcome:
-    """Close the loop on each axis; writes loop.json, the extended model and the tables."""
+    """Close the loop on each axis; writes loop.json, the extended model and the tables.
+
+    Parameters
+    ----------
+    model, paths, axes, out, jobs, watch
+        As of `fit`.
+    seed : int
+        For the decoys.
+    """
     work = partial(_closed, seed)
     done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)
     ensure_directory(out)

@@ -113,7 +113,18 @@ def tell(
 ) -> Morning:
     """Say what a start has found that nobody was told of yet.
 
-    The folder of the results is named in paths, the cell's file in what can be done about an alarm.
+    Parameters
+    ----------
+    summary
+        How the robots that were looked at stand.
+    untold
+        Events that nobody was told of.
+    outcome
+        What the start did.
+    out
+        Folder of the results, for paths.
+    cell
+        The cell's file, for what can be done about an alarm.
     """
     names = {robot.name for robot in summary.robots}
     news = [event for event in untold if event.robot in names or event.kind in NO_ROBOTS]

@@ -28,8 +28,23 @@ def settle_cell(
 ) -> Summary:
     """Bring everything that follows from the nights up to date.
 
-    Only if the `whole` cell was looked at, all nights of all robots, a night that is not known is
-    missing.
+    Parameters
+    ----------
+    cell
+        What is looked after.
+    source
+        Name of its file, for errors.
+    history
+        Of the cell.
+    robots
+        Those that were looked at.
+    whole
+        Whether all nights of all robots were: only then a night that is not known is missing.
+
+    Returns
+    -------
+    Summary
+        How all robots of the cell stand now.
     """
     # another version may tell other alarms, or tell them otherwise, of nights it cannot judge anew
     rule = {**cell.alarm.model_dump(), "limit": LIMIT, "lately": LATELY, "version": __version__}

@@ -293,8 +293,14 @@ def summarise(
 ) -> Summary:
     """Read how a cell stands.
 
-    Of robots that may have no night yet, too; baselines are the first nights, or given by dates or
-    files.
+    Parameters
+    ----------
+    history
+        Of the cell.
+    robots
+        Robots of the cell that may have no night yet.
+    by_first_nights
+        Whether baselines are the first nights, not given by dates or files.
     """
     # of a joint's alarms under several conditions the latest that nobody knows of
     by_news = sorted(

@@ -27,9 +27,11 @@ AGAIN_S = 0.01
 def interruptible() -> Iterator[list[int]]:
     """Let signals unwind the main thread, so that temporary files go; the second one ends it.
 
-    Yielded is the signal that has come, if one has. Libraries may answer an exception in their
-    midst with one of their own, or go on half imported: whatever is raised after a signal is its
-    doing.
+    Yields
+    ------
+    list of int
+        The signal that has come, if one has. Libraries may answer an exception in their midst with
+        one of their own, or go on half imported: whatever is raised after a signal is its doing.
     """
     came: list[int] = []
     if threading.current_thread() is not threading.main_thread():

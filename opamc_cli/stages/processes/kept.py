@@ -46,8 +46,12 @@ def remembered(
 ) -> Callable[[Job], Result]:
     """Return a stage's function for one job, made to look for the job's result first.
 
-    It has to be a pure function of its job; errors are not kept. The function itself where there is
-    no place for results.
+    Parameters
+    ----------
+    function
+        A pure function of its job; its errors are not kept.
+    kept
+        Where results lie; None: the function itself is returned.
     """
     return function if kept is None else partial(_found_or_made, function, kept)
 
@@ -62,7 +66,13 @@ def _found_or_made(function: Callable[[Job], Result], kept: "KeptResults", job: 
 
 
 class KeptResults:
-    """A folder of results by the hash of the jobs that they are the results of."""
+    """A folder of results by the hash of the jobs that they are the results of.
+
+    Parameters
+    ----------
+    folder
+        Made when something is kept.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -65,8 +65,18 @@ def map_items(
 
     A user's error (`OpamcError`) in one item does not stop the others. Workers are spawned, never
     forked: threads of compiled libraries do not survive a fork. Each computes on one thread, so
-    that workers do not compete for the cores. For 0 jobs there is one per core, if they are worth
-    their start; for 1 it is this process.
+    that workers do not compete for the cores.
+
+    Parameters
+    ----------
+    function
+        Importable by name (workers are spawned).
+    items
+        What it is applied to.
+    jobs
+        Number of workers; 0: one per core, if they are worth their start; 1: this process.
+    watch
+        Called as items get done.
     """
     if jobs == 0:
         return _as_it_pays(function, items, watch)

@@ -250,8 +250,12 @@ def fitting_units(
 ) -> list[dict[str, str]]:
     """Return units, one of them as it was taken, in which a speed would be its position's.
 
-    Of its ratio to the position's rate of change, 1 where they agree, in the units that both were
-    taken to be in.
+    Parameters
+    ----------
+    ratio : float
+        Of the speed to the position's rate of change, 1 where they agree.
+    position, velocity : str
+        Units that both were taken to be in.
 
     Examples
     --------

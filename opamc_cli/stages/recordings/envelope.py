@@ -57,8 +57,16 @@ def current_offset(
     that turn often. Left in, it modulates the envelope once per electrical period, by more than
     early damage does, and it drifts from session to session.
 
-    It is 0 for a reported current, whose mean is torque, and without such a motion. Given are start
-    and stop of motions, in samples (half-open), and the highest frequency of each, Hz.
+    It is 0 for a reported current, whose mean is torque, and without such a motion.
+
+    Parameters
+    ----------
+    run, axis
+        Open run, and axis counted from 1.
+    motions
+        Start and stop of each, in samples (half-open), and its highest frequency, Hz.
+    wanted
+        See `read_course`.
     """
     if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
         return 0j
@@ -92,10 +100,22 @@ def read_course(
 ) -> npt.NDArray[np.floating]:
     """Read the current of an axis whose course over start..stop repeats with the motion.
 
-    What lies outside the run is left out; the offset, A, is taken off the current vector first, see
-    `current_offset`, and the current is taken as `PatternsConfig.envelope` says. Returned is, (stop
-    - start,), A, in the run's own float width, the envelope of phase currents, or the reported
-    current with its sign.
+    Parameters
+    ----------
+    run, axis
+        Open run, and axis counted from 1.
+    start, stop
+        Half-open interval of samples; what lies outside the run is left out.
+    wanted
+        Which current it is taken from, see `PatternsConfig.envelope`.
+    offset
+        Taken off the current vector first, A; see `current_offset`.
+
+    Returns
+    -------
+    array
+        Shape (stop - start,), A, in the run's own float width: the envelope of phase currents,
+        the reported current itself with its sign.
 
     Raises
     ------
@@ -114,8 +134,11 @@ def read_current(
 ) -> npt.NDArray[Any]:
     """Read the current vector of an axis, or its signed reported current; see `read_course`.
 
-    Returned is, (stop - start,), A, the Clarke vector or analytic signal (complex) where phases are
-    known, the reported current (real) else.
+    Returns
+    -------
+    array
+        Shape (stop - start,), A: the Clarke vector or analytic signal (complex) where phases
+        are known, the reported current (real) else.
 
     Raises
     ------

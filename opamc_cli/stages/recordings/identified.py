@@ -30,9 +30,14 @@ class IdentifiedPart:
     ) -> Iterator[tuple[dict[str, Any], npt.NDArray[np.floating], bool]]:
         """Yield what is counted, segment by segment.
 
-        Of each the row of the motion table, with the ends of the aligned segment; its course, A,
-        see `read_course`, the sensors' offset taken off if that is wanted; and whether the
-        recording holds all of it.
+        Yields
+        ------
+        row
+            Of the motion table, with the ends of the aligned segment.
+        current
+            Its course, A, see `read_course`; the sensors' offset is taken off if that is wanted.
+        whole
+            Whether the recording holds all of it.
         """
         spans = [aligned_span(row) for row in self.rows]
         with self.source.open() as run:

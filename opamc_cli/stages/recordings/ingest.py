@@ -99,8 +99,18 @@ def run(
 
     What has become a run already, by the same map, is left alone.
 
-    Of files, folders, patterns and addresses in object stores. What has become a run already, by
-    the same map, is left alone.
+    Parameters
+    ----------
+    files
+        Files, folders, patterns and addresses in object stores.
+    channels
+        The map.
+    out
+        Output folder.
+    jobs
+        Worker processes.
+    watch
+        Called with what is done and what there is to do.
 
     Raises
     ------

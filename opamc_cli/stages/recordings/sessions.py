@@ -38,10 +38,22 @@ def sessions_of(
 ) -> Sessions:
     """Group recordings into sessions.
 
-    By metadata `session`, else the day of `started_at`, which begins at an hour UTC, else the
-    folder (if folders tell them apart, see `lie_in_folders`), else the file. A folder whose name is
-    a date more than a day off comes before `started_at`: a clock that was never set would make one
-    session of all.
+    Parameters
+    ----------
+    sources
+        Recordings of one side.
+    day_starts_at_h
+        Hour of the day, UTC, at which one night ends and the next begins.
+    by_folder
+        Whether the folders of recordings without session and time tell them apart; see
+        `lie_in_folders`.
+
+    Returns
+    -------
+    Sessions
+        By metadata `session`, else the day of `started_at`, else the folder, else the file. A
+        folder whose name is a date more than a day off comes before `started_at`: a clock that was
+        never set would make one session of all.
     """
     told: dict[str, tuple[str, str]] = {}
     wrong_clocks = 0

@@ -51,8 +51,25 @@ def run(
 ) -> Outcome[dict[str, Any]]:
     """Record the sessions of a configuration.
 
-    With i_q, joint angle and temperature beside each run where truth signals are asked for.
-    Returned is each run's entry in `truth.json`.
+    Parameters
+    ----------
+    config
+        Robot, program, faults, effects, what is recorded.
+    seed
+        Seed of everything random.
+    out
+        Output folder.
+    truth_signals
+        Whether to write i_q, joint angle and temperature beside each run.
+    jobs
+        Worker processes; 0: one per core.
+    watch
+        Called as the work gets done.
+
+    Returns
+    -------
+    Outcome
+        Per run its entry in `truth.json`.
 
     Raises
     ------

@@ -44,8 +44,16 @@ def write_recording(
 ) -> Written:
     """Write the run that a recording becomes.
 
-    Of blocks of samples by column, in the units of a run; `path` is what the recording is called in
-    what is said of it.
+    Parameters
+    ----------
+    path, run
+        The recording, as it is named in what is said of it, and the file that is written.
+    channels
+        The map.
+    info
+        Metadata of the run.
+    blocks
+        Samples by column, in the units of a run.
 
     Raises
     ------

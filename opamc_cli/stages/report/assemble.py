@@ -59,8 +59,18 @@ def run(
 ) -> ReportOutcome:
     """Write report.html of an output folder.
 
-    Of scores.parquet, features.parquet and whatever else the chain left; the runs may have been
-    moved. Drawings of the baseline alone may be kept.
+    Parameters
+    ----------
+    out
+        Folder with scores.parquet, features.parquet and whatever else the chain left.
+    title
+        Heading of the page.
+    baseline, target
+        Where the runs are now, if not where the tables remember them.
+    figures_of_healthy
+        Whether joints that are healthy have their part in the figures.
+    kept
+        Where drawings of the baseline alone may lie.
 
     Raises
     ------

@@ -102,7 +102,10 @@ def compared(inputs: ReportInputs) -> list[dict[str, Any]]:
 def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the page says of a closed loop.
 
-    Of one object of loop.json's `axes`.
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
     """
     return {
         "axis": int(entry["axis"]),

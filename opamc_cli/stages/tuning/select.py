@@ -58,8 +58,18 @@ def run(
 ) -> SelectionOutcome:
     """Rate orders and scale factors by how well healthy segments know their own motion.
 
-    Of the motions of a baseline; of the options `patterns.envelope` and `patterns.remove_offset`
-    are used. See `patterns.run`.
+    Parameters
+    ----------
+    motions
+        Table of stage `identify`, of the baseline.
+    config
+        `patterns.envelope` and `patterns.remove_offset` are used.
+    out
+        Folder of the table.
+    orders, gammas
+        What to rate.
+    moved_to, jobs, watch
+        As of `patterns.run`.
 
     Raises
     ------

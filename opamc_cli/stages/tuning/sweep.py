@@ -105,9 +105,19 @@ def run(
 ) -> SweepOutcome:
     """Compute the divergence of every segment for every delay and order.
 
-    Of tables of stage `identify`, delays in samples >= 1 and orders 3..7; without a target of the
-    baseline alone. Of the options `patterns.envelope`, `patterns.remove_offset`, `patterns.gamma`,
-    `score.base` and `score.day_starts_at` are used.
+    Parameters
+    ----------
+    baseline, target
+        Tables of stage `identify`; without a target only the baseline's own divergences.
+    config
+        `patterns.envelope`, `patterns.remove_offset`, `patterns.gamma`, `score.base` and
+        `score.day_starts_at` are used.
+    out
+        Folder of the sweep table.
+    taus, orders
+        What is swept: samples >= 1, orders 3..7.
+    jobs, watch
+        As of `segment.run`.
 
     Raises
     ------

@@ -16,7 +16,14 @@ def replace_folder(
 
     Between two renames there is none: whoever finds none takes the work for not done.
 
-    If the names `of` a folder of results' files are given, another file is somebody else's.
+    Parameters
+    ----------
+    folder
+        Where.
+    files
+        Their content.
+    of
+        Names of the files that a folder of results has; None: any. Another one is somebody else's.
 
     Raises
     ------
@@ -54,6 +61,13 @@ def replace_folder(
 
 def remove_folder(folder: Path, *, of: Collection[str] | None = None) -> None:
     """Remove a folder of results and what a killed process left beside it.
+
+    Parameters
+    ----------
+    folder
+        Which.
+    of
+        Names of the files that a folder of results has; None: any. Another one is somebody else's.
 
     Raises
     ------

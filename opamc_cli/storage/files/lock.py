@@ -17,7 +17,12 @@ LOCK_NAME = ".opamc.lock"
 def output_lock(folder: Path, chosen_by: str = "--out") -> Iterator[None]:
     """Hold the output folder for this process; the kernel lets go of it when the process dies.
 
-    Errors say what another one is chosen by.
+    Parameters
+    ----------
+    folder
+        Which.
+    chosen_by
+        What another one is named with, for errors.
 
     Raises
     ------

@@ -111,8 +111,21 @@ def _refuse_repeated(path: Path, schema: pa.Schema, advice: str) -> None:
 def samples_sha256(path: Path, columns: Iterable[str], footer: pq.FileMetaData) -> str:
     """Return the SHA-256 of some columns as they are stored, whatever the file says besides.
 
-    Nothing is decoded: the same samples, compressed otherwise, are others. Empty if none of them
-    ever changes.
+    Nothing is decoded: the same samples, compressed otherwise, are others.
+
+    Parameters
+    ----------
+    path
+        A Parquet file.
+    columns
+        Names of columns of numbers.
+    footer
+        Of the file.
+
+    Returns
+    -------
+    str
+        Empty if none of them ever changes.
 
     Raises
     ------

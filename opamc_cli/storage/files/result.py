@@ -42,10 +42,19 @@ def published_text(text: str) -> str:
 def result(folder: Path, *names: str, linked: bool = True) -> Iterator[Path]:
     """Yield an empty folder; what is written there replaces the files `names` at once on success.
 
-    Files of other names that an earlier result left in `folder` stay. The caller holds the folder's
-    lock. The names are of all files that this kind of result may have, below `folder`; the first
-    one vouches for the others. What users move elsewhere, such as recordings, is not `linked` but
-    plain files, which appear one after the other while the one that vouches for them is away.
+    Files of other names that an earlier result left in `folder` stay. The caller holds the
+    folder's lock.
+
+    Parameters
+    ----------
+    folder
+        The output folder.
+    names
+        Every file that this kind of result may have, as paths below `folder`; the first one
+        vouches for the others.
+    linked
+        False: plain files, for what users move elsewhere, such as recordings. They appear one
+        after the other, while the file that vouches for them is away.
 
     Raises
     ------

@@ -66,7 +66,12 @@ def _to_read(path: Path) -> str:
 class History:
     """An open history.
 
-    Made if it is not there, but for those who look only.
+    Parameters
+    ----------
+    path
+        The file; made if it is not there, unless `read_only`.
+    read_only
+        For those who look only.
 
     Raises
     ------
@@ -350,8 +355,16 @@ class History:
     ) -> None:
         """Replace what follows from a robot's nights.
 
-        All its alarms, program, axis and night of every night in which the rule stands, and what is
-        worth saying.
+        Parameters
+        ----------
+        robot
+            Its name.
+        alarms
+            All its alarms.
+        standing
+            Program, axis and night of every night in which the alarm rule stands.
+        events
+            What is worth saying.
         """
         found, values = list(events), (robot, *OF_ROBOT)
         of = f"WHERE robot = ? AND kind IN ({_marks(OF_ROBOT)})"

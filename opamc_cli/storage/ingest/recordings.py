@@ -34,8 +34,13 @@ def find_recordings(arguments: Sequence[str], any_ending: bool = False) -> list[
     A folder stands for every recording below it whose ending is known, and their runs lie below
     the output folder as they lie below it.
 
-    Of arguments as the user wrote them. Where the map tells the format, files of a folder are taken
-    whatever their ending where none tells it.
+    Parameters
+    ----------
+    arguments
+        As the user wrote them.
+    any_ending
+        Take the files of a folder whatever their ending where none tells a format, since the map
+        does.
 
     Raises
     ------

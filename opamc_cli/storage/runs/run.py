@@ -43,7 +43,12 @@ LARGEST_SAMPLE = 1e9
 class Run:
     """A recording, opened lazily.
 
-    Stage tables call it by a name, the file's stem by default.
+    Parameters
+    ----------
+    path
+        The Parquet file.
+    name
+        How stage tables call it; the file's stem by default.
 
     Raises
     ------

@@ -25,13 +25,16 @@ ROW_GROUP_SAMPLES = 1 << 18
 def write_run(path: Path, info: RunInfo, schema: pa.Schema) -> Iterator[pq.ParquetWriter]:
     """Open a run for writing, block by block; it appears under its name when all is written.
 
-    Yielded is a writer for tables of the given schema; blocks of `ROW_GROUP_SAMPLES` rows keep row
-    groups whole.
-
     Raises
     ------
     InputError
         If what it says of itself is out of bounds.
+
+    Yields
+    ------
+    pyarrow.parquet.ParquetWriter
+        Call `write_table` with tables of the given schema. Blocks of `ROW_GROUP_SAMPLES` rows
+        keep row groups whole.
     """
     metadata = dict(schema.metadata or {})
     metadata[METADATA_KEY] = raw = info.to_json().encode()

@@ -267,14 +267,25 @@ def run_axis(
 ) -> NDArray[np.float64]:
     """Integrate one axis and return its signals at the sampling rate.
 
-    References, joint side, and friction that does not repeat, motor side, N.m, are at the control
-    rate, (n_control,); the latter acts only while the motor turns. Undeclared ripples, (k, 4), are
-    order per motor turn, amplitude in A, phase in rad, exponent of the speed (relative to 1 rad/s
-    of the motor; 0: constant). The anti-alias filter is given as second-order sections at the
-    step's rate, (s, 6).
+    Parameters
+    ----------
+    c : AxisConstants
+    reference_position, reference_velocity, reference_acceleration : ndarray, shape (n_control,)
+        Joint-side reference at the control rate.
+    fluctuation : ndarray, shape (n_control,)
+        Friction that does not repeat, motor side, N.m; acts only while the motor turns.
+    ripples : ndarray, shape (k, 4)
+        Undeclared ripples: order per motor turn, amplitude in A, phase in rad, exponent of the
+        speed (relative to 1 rad/s of the motor; 0: constant).
+    filter_sections : ndarray, shape (s, 6)
+        The anti-alias filter as second-order sections at the step's rate.
+    n_samples : int
 
-    Columns of the result, (n_samples, 9), are `SIGNALS`: truth, the current vector behind the
-    anti-alias filter, and i_q as the drive reports it. A row is the state at its sample's instant.
+    Returns
+    -------
+    ndarray, shape (n_samples, 9)
+        Columns are `SIGNALS`: truth, the current vector behind the anti-alias filter, and i_q as
+        the drive reports it. A row is the state at its sample's instant.
     """
     out = np.empty((n_samples, 9))
     n_sections = filter_sections.shape[0]

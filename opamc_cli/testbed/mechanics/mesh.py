@@ -23,8 +23,19 @@ def damaged_share(
 ) -> tuple[float, float]:
     """Share of a mesh zone that lies over the damaged sector, and its derivative.
 
-    By the angle of the zone's centre from the sector's, any turn, and half the arc of both. The
-    share, 0..1, is smooth in the angle; its derivative in 1/rad.
+    Parameters
+    ----------
+    angle_rad : float
+        Angle of the zone's centre from the sector's centre, any turn.
+    half_sector_rad, half_zone_rad : float
+        Half the sector's and half the zone's arc.
+
+    Returns
+    -------
+    share : float
+        0..1, smooth in the angle.
+    slope : float
+        Its derivative with respect to the angle, 1/rad.
     """
     wrapped = angle_rad - _TWO_PI * floor(angle_rad / _TWO_PI + 0.5)
     sign = 1.0
@@ -51,11 +62,30 @@ def zone_torque(
 ) -> tuple[float, float, float]:
     """Torque of one mesh zone with play that its own wind-up closes.
 
-    Under load the neighbours of the ground teeth deflect, more pairs come into mesh and the stumps
-    are pressed into their gaps: the play shrinks by `closing` per radian of wind-up. Wind-up and
-    half the play without load are in rad, stiffnesses of the whole mesh in N.m/rad and N.m/rad^3;
-    the weight is the zone's share of them. Returned are the derivatives of the zone's energy by the
-    wind-up and by the half play, N.m, and by the weight, J.
+    Under load the neighbours of the ground teeth deflect, more pairs come into mesh and the
+    stumps are pressed into their gaps: the play shrinks by `closing` per radian of wind-up.
+
+    Parameters
+    ----------
+    windup_rad : float
+        Wind-up of the joint, rad.
+    half_play_rad : float
+        Half the zone's play without load, rad.
+    closing : float
+        Play closed per wind-up, 0 or more.
+    weight : float
+        The zone's share of the stiffness.
+    stiffness, stiffening : float
+        Of the whole mesh, N.m/rad and N.m/rad^3.
+
+    Returns
+    -------
+    torque_nm : float
+        Derivative of the zone's energy by the wind-up.
+    play_torque_nm : float
+        Derivative of its energy by the half play.
+    energy_per_weight_j : float
+        Energy over weight: derivative of its energy by the weight.
     """
     size = abs(windup_rad)
     half = half_play_rad - closing * size

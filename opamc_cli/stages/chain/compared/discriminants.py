@@ -56,8 +56,14 @@ class LatentModels:
     ) -> "LatentModels":
         """Add the labelled rows of one diagnosis and train again.
 
-        Used are the rows of all motions pooled; axes not named as at fault count as normal, and
-        rows of the same source are replaced.
+        Parameters
+        ----------
+        features
+            Rows of the feature table; those of all motions pooled are used.
+        fault_axes
+            Axes known to be at fault; the others are taken as normal.
+        source
+            What tells this diagnosis from others; rows of the same source are replaced.
         """
         kept = [row for row in self.rows if row["source"] != source]
         added = [
@@ -94,8 +100,16 @@ def learn(
 ) -> LatentModels:
     """Add one diagnosis with known outcome to a model file's rows and train again.
 
-    The file need not exist yet; axes not named as at fault count as normal. To learn the same
-    pattern tables twice replaces their rows.
+    Parameters
+    ----------
+    path
+        The model file; need not exist yet.
+    features
+        Feature table of the diagnosis.
+    fault_axes
+        Axes known to be at fault; all others count as normal.
+    patterns
+        The pattern tables it was made from: learning the same ones twice replaces their rows.
 
     Raises
     ------

@@ -42,10 +42,19 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
     All joints of a robot change their speed together: a run is judged by the motions of all of
     them, so that a joint whose fault moves its boundaries does not count alone.
 
-    Both are rows of motion tables, and may be the same: then the speed that most runs share is the
-    baseline's. Of the relative difference the tolerance counts as none, beside what is open of the
-    lengths. Returned is, by run, how many times as long as the baseline's its motions last, in the
-    middle.
+    Parameters
+    ----------
+    motions
+        Rows of a motion table.
+    baseline
+        Those of the baseline's, which may be the same: then the speed that most runs share is its.
+    tolerance
+        Relative difference that counts as none, beside what is open of the lengths.
+
+    Returns
+    -------
+    dict of str to float
+        By run, how many times as long as the baseline's its motions last, in the middle.
     """
     usual = _usual(baseline, tolerance)
     known = [middle for middle, _, _ in _middles(baseline, usual).values()]
@@ -63,8 +72,12 @@ def odd_cycles(motions: pa.Table) -> dict[tuple[str, int], dict[int, float]]:
     """Find cycles of another speed than most of their recording: it was changed midway.
 
     Where a joint creeps into its stop, a motion found from phase currents ends there in one cycle
-    and before it in the next. The carrier tells that both are of one speed. Returned is, by run and
-    axis, how many times as long as the others its odd cycles last, by number.
+    and before it in the next. The carrier tells that both are of one speed.
+
+    Returns
+    -------
+    dict of (str, int) to dict of int to float
+        By run and axis, how many times as long as the others its odd cycles last, by number.
     """
     run, axis, ratio, samples, _, carrier = _lasting(motions)
     cycle = np.asarray(motions["cycle"])[_whole_motions(motions)]

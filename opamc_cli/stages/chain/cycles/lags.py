@@ -30,8 +30,19 @@ def lags_to(
 ) -> npt.NDArray[np.int64]:
     """Synchronise identified segments of an axis with the reference segments of their motions.
 
-    Returned are samples, (n,), 0 where the courses are not alike. `envelope` is synchronised where
-    the joint's motion is not logged.
+    Parameters
+    ----------
+    motion, spans
+        Of each segment: its motion, and its first sample and the one behind its last.
+    max_lag_s
+        Most that it is moved by.
+    envelope
+        What is synchronised where the joint's motion is not logged.
+
+    Returns
+    -------
+    numpy.ndarray
+        Samples, (n,); 0 where the courses are not alike.
     """
     lags = np.zeros(len(spans), dtype=np.int64)
     with part.source.open() as run, reference.source.open() as reference_run:

@@ -72,8 +72,14 @@ def mixes(
     """Tell whether segments are told as one motion that turn by other amounts, each time again.
 
     Turns, unlike places, scatter where noise hides the current: by others than a motion's own
-    repetitions do, or it is no other motion. All are of shape (n,): turns, and which motion of a
-    cycle that was found without its turns, and with them.
+    repetitions do, or it is no other motion.
+
+    Parameters
+    ----------
+    turns
+        Of each segment.
+    told, led
+        Which motion it is of a cycle that was found without its turns, and with them.
     """
     both = (told > UNIDENTIFIED) & (led > UNIDENTIFIED)
     turns, told, led = turns[both], told[both], led[both]

@@ -57,8 +57,18 @@ def rows_by_motion(
 ) -> list[MotionRows]:
     """Return the motions that both sides have in the same shape.
 
-    Of two tables of a witness; `value` is a column of lists, `shape` are the columns whose product
-    is a list's length.
+    Parameters
+    ----------
+    baseline, target
+        Tables of a witness.
+    axis
+        Counted from 1.
+    names
+        Sessions of the axis.
+    value
+        Column of lists.
+    shape
+        Columns whose product is a list's length.
     """
     sides = [_of_axis(table, axis, value, shape) for table in (baseline, target)]
     numbers = [

@@ -20,9 +20,15 @@ def courses(
 ) -> Iterator[tuple[list[Mapping[str, Any]], str]]:
     """Yield a joint's nights by the baseline that they were compared with.
 
-    Nights of another condition say nothing of what this one's have shown: neither do they clear its
-    alarms, nor does its chart begin anew after them. With them comes the first night of the
-    condition's next baseline, empty without one.
+    Nights of another condition say nothing of what this one's have shown: neither do they clear
+    its alarms, nor does its chart begin anew after them.
+
+    Yields
+    ------
+    rows : list
+        Nights of one condition, one baseline after the other.
+    replaced : str
+        First night of the condition's next baseline; empty without one.
     """
     by_condition: dict[str, list[Mapping[str, Any]]] = {}
     for row in joint:

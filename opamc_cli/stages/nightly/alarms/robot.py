@@ -46,8 +46,22 @@ def settle_robot(
 ) -> Settled:
     """Find a robot's alarms, and what is worth saying of it.
 
-    Of its verdicts and measures, as `History.series` returns them, of what became of its nights, in
-    time order, and of what users declared.
+    Parameters
+    ----------
+    robot
+        Its name.
+    series
+        Its verdicts and measures by program, axis and night, as `History.series` returns them.
+    nights
+        What became of its nights, in time order.
+    declared
+        What users declared of it.
+    rule
+        When nights make an alarm.
+    fault_effect
+        Effect from which a change is a fault.
+    baseline_nights
+        Nights of a baseline.
     """
     alarms: list[AlarmRow] = []
     standing: list[tuple[str, int, str]] = []

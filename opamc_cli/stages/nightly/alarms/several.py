@@ -21,7 +21,10 @@ Row = Mapping[str, Any]
 def said_once(told: Iterable[tuple[str, Event]]) -> Iterator[Event]:
     """Name the joints that have the same to say of a night, in the one text of them all.
 
-    Told are the program, where there are several, and what is said, without the joint.
+    Parameters
+    ----------
+    told
+        Where it is said of (the program, if there are several), and what, without the joint.
     """
     groups: dict[tuple[str, ...], list[tuple[str, Event]]] = {}
     for where, event in told:
@@ -81,7 +84,14 @@ def together(
 ) -> tuple[set[tuple[int, str]], list[Event]]:
     """Return which joints moved together with others in which nights, and what is said of it.
 
-    Of nights in one program, named where there are several, but those under an alarm.
+    Parameters
+    ----------
+    rows
+        Nights of a robot's joints in one program, but those under an alarm.
+    where
+        The program, if there are several.
+    remind_after
+        Nights after which it is said again.
     """
     nights: dict[str, dict[str, list[Row]]] = {}
     for row in rows:

@@ -24,8 +24,11 @@ COUNT = re.compile(r"\d[\d.]*(?:%|(?: of \d+)? (?:segments?|samples?|motions?)\b
 def together(reasons: Sequence[str]) -> list[str]:
     """Say once what is wrong with several recordings, in the order in which each is said last.
 
-    Of those about a recording, "PATH: WHY", those that say the same are one. It is named by its
-    file and folder: robot and night are said before.
+    Parameters
+    ----------
+    reasons
+        Sentences; of those about a recording, "PATH: WHY", those that say the same are one. A
+        recording is named by its file and folder: robot and night are said before.
 
     Examples
     --------

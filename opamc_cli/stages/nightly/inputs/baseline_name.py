@@ -6,7 +6,12 @@ import re
 def baseline_name(begin: str, condition: str) -> str:
     """Return a baseline's name.
 
-    Of which nights or files it is made, without a comma, and of rate, speed and payload, in words.
+    Parameters
+    ----------
+    begin
+        Which nights or files it is made of; without a comma.
+    condition
+        Rate, speed and payload, in words.
 
     Examples
     --------

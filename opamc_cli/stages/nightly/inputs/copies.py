@@ -10,8 +10,16 @@ from opamc_cli.storage.logs import Facts
 def without_copies(recordings: Sequence[Recording]) -> list[Recording]:
     """Have recordings of an earlier night stand for nothing.
 
-    A copy has the bytes of an earlier one, or its currents' samples whatever it says of itself: it
-    tells no more than what it is a copy of.
+    Parameters
+    ----------
+    recordings
+        All of a robot's.
+
+    Returns
+    -------
+    list of Recording
+        A copy has the bytes of an earlier one, or its currents' samples whatever it says of
+        itself: it tells no more than what it is a copy of.
     """
     first: dict[str, Recording] = {}
     for one in sorted(recordings, key=lambda one: (one.night, one.log.path)):

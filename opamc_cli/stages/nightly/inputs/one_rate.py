@@ -14,6 +14,13 @@ def named_rates(conditions: Iterable[str], recordings: Iterable[Recording]) -> l
     The first recording of a clock names its rate, however near the next ones are to another: a
     night that is added at the end moves none. Those of baselines that were complete come before
     all, as their names stay when earlier nights are filled in.
+
+    Parameters
+    ----------
+    conditions
+        Of baselines that were complete before.
+    recordings
+        All of the robot's.
     """
     told = [rate for rate in map(rate_in, conditions) if rate]
     for one in sorted(recordings, key=lambda one: (one.night, one.log.path)):

@@ -92,8 +92,16 @@ def find_recordings(
 ) -> CellRecordings:
     """List a cell's recordings; read those that are new or have another size or time than before.
 
-    Of the robots that are asked for, None: of all; `copies` is a folder for what lies in an object
-    store.
+    Parameters
+    ----------
+    cell
+        What to look for.
+    history
+        What is remembered of files, and where new ones are remembered.
+    only
+        Robots that are asked for; None: all.
+    copies
+        Folder for copies of what lies in an object store.
 
     Raises
     ------

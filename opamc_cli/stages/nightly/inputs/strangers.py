@@ -23,6 +23,17 @@ def without_strangers(
     Of the robots that hold the same bytes, the one that the metadata names recorded them, else the
     one that alone was judged with them before; of two that are new nobody knows. Recordings that
     are gone do not count: who put a file into its right place has removed it from the wrong one.
+
+    Parameters
+    ----------
+    by_robot
+        Recordings of the robots that are looked at.
+    fixed
+        Those that `baseline.runs` names.
+    beside
+        What is known of the cell's other robots.
+    recorded
+        What became of the robots' nights.
     """
     every = [one for known in (by_robot, fixed, beside) for own in known.values() for one in own]
     held = _held_by_several(every)

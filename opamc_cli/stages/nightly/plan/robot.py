@@ -13,7 +13,17 @@ from opamc_cli.stages.nightly.plan.reason import hashes_before, key_of, reason_o
 
 
 def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
-    """Say what is to be done of each night of a robot."""
+    """Say what is to be done of each night of a robot.
+
+    Parameters
+    ----------
+    robot
+        Its name.
+    recordings
+        All its recordings that are there.
+    now
+        What is known besides.
+    """
     recordings = without_copies(recordings)
     twin_of = {one.log.path: (one, first) for one, first in twins(recordings)}
     recordings = [one for one in recordings if one.log.path not in twin_of]

@@ -94,8 +94,19 @@ def look_at(
 ) -> Look:
     """Find what is to be done of some robots, and remember their baselines.
 
-    `tried` holds robot, night and key of what this start has done, and takes what is found now. If
-    the last look has no news, there is nothing to wait for.
+    Parameters
+    ----------
+    robots
+        Names.
+    scene, past, history
+        What there is and what is known.
+    tried
+        Robot, night and key of the nights that this start has done; those that are found now are
+        added.
+    outcome
+        Takes what is worth saying.
+    has_news
+        Whether the last look found anything to do: else there is nothing to wait for.
     """
     done = {key[:2] for key in tried} if has_news else None
     look = Look()

@@ -55,8 +55,18 @@ def record_judged(
 ) -> None:
     """Record what a worker answered.
 
-    One result for each program, the worst first, or that the worker broke, as it did in some
-    `attempts` before.
+    Parameters
+    ----------
+    cell, history
+        Where.
+    night, job
+        What the worker was given.
+    answer
+        One result for each program, the worst first; or that the worker broke.
+    attempts
+        Starts in which it broke before.
+    outcome
+        Takes what became of the night.
 
     Raises
     ------

@@ -51,8 +51,22 @@ def run(
 ) -> CellOutcome:
     """Do the nights that are new and asked for; the caller holds the lock of `cell.out`.
 
-    A Dask scheduler, if one is given by its address, is handed the nights instead of worker
-    processes.
+    Parameters
+    ----------
+    cell
+        What to look after.
+    source
+        Name of its file, for errors.
+    history
+        Of the cell.
+    wanted
+        Which nights.
+    jobs
+        Worker processes; 0: one per core.
+    scheduler
+        Address of a Dask scheduler that is handed the nights instead.
+    progress
+        Called with each step as it begins.
 
     Raises
     ------

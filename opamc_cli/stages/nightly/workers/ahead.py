@@ -38,8 +38,16 @@ class _Baseline:
 def look_ahead(inputs: Sequence[Input], out: Path, config: Config, kept: KeptResults) -> None:
     """Keep how each joint moved in a baseline, and the drawing that is of the baseline alone; once.
 
-    By the tables in `out`, of a night that was compared with it; nothing where no cause is to be
-    explained.
+    Parameters
+    ----------
+    inputs
+        The baseline's recordings.
+    out
+        Folder of the tables of a night that was compared with it.
+    config
+        Options of its diagnosis; without causes to be explained nothing is done.
+    kept
+        Where it is kept.
     """
     names, hashes = zip(*((one.name, one.sha256) for one in inputs), strict=True)
     baseline = _Baseline(names, hashes, config)

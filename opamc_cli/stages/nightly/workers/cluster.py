@@ -28,7 +28,17 @@ def run_all(
 
     A worker that dies is none of our business: Dask hands its nights to another. Memory is limited
     by the workers' own `--memory-limit`; a worker that takes longer than `seconds` is restarted.
-    The function is ``module:name``, importable on the workers.
+
+    Parameters
+    ----------
+    function
+        ``module:name`` of a function of one job, importable on the workers.
+    jobs
+        What it is applied to, in this order.
+    address
+        Of the scheduler.
+    seconds
+        Longest time of one job once it has begun.
 
     Raises
     ------

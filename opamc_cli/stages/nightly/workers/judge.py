@@ -37,7 +37,10 @@ from opamc_cli.storage.tables import read_table
 def compute(job: NightJob) -> tuple[ProgramResult, ...]:
     """Judge one robot's night.
 
-    The program that is worst off comes first.
+    Returns
+    -------
+    tuple of ProgramResult
+        The program that is worst off first.
 
     Raises
     ------

@@ -132,8 +132,18 @@ def run_all(
 ) -> Iterator[tuple[Job, Any]]:
     """Yield every job with its result, or why it has none, as they end.
 
-    The function is ``module:name``; workers, one per core for 0, load it before their memory is
-    limited, to so much beyond what the program itself takes. Each computes on one thread.
+    Parameters
+    ----------
+    function
+        ``module:name`` of a function of one job; workers load it before their memory is limited.
+    jobs
+        What it is applied to, in this order.
+    n_workers
+        Processes; 0: one per core. Each computes on one thread.
+    seconds
+        Longest time of one job.
+    memory_gb
+        Most address space of a worker beyond what the program itself takes; None: no limit.
     """
     workers = min(n_workers or os.cpu_count() or 1, len(jobs))
     pool: _Pool[Job] = _Pool(function, seconds, memory_gb)

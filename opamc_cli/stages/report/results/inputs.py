@@ -148,8 +148,13 @@ def _of_axis(document: Mapping[str, Any] | None, axis: int) -> Mapping[str, Any]
 def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInputs:
     """Read what an output folder holds for a report.
 
-    It has to hold scores.parquet with features.parquet, or loop.json, and may hold all else; runs
-    may have been moved to other folders, told for each role.
+    Parameters
+    ----------
+    out
+        The folder; scores.parquet with features.parquet, or loop.json, must be in it, all else
+        may be.
+    moved_to
+        For each role the folders or files where its runs are now.
 
     Raises
     ------

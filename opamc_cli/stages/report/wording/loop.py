@@ -22,6 +22,11 @@ def ceiling_phrase(entry: Mapping[str, Any]) -> str:
 
     Where a name was found that they do not hold, or two standard errors span all shares that there
     are, they tell nothing of what there is to explain.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
     """
     share, error = (entry["ceiling"][key] for key in ("share", "standard_error"))
     if 2 * error >= 1 or (entry["steps"] and not ceiling_known(entry)):
@@ -45,7 +50,12 @@ where one moves alone; 4 to 16 times in programs of two seconds in which its nei
 def beyond_noise(entry: Mapping[str, Any], times: float = MORE_THAN_NOISE) -> float | None:
     """Return what is left beyond the noise where nothing was found missing.
 
-    None below so many times the noise, and where something was found.
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    times
+        None is returned below so many times the noise, and where something was found.
     """
     noise, left = entry.get("noise_a"), (entry.get("before") or {}).get("rmse_a")
     if entry.get("verdict") != "nothing-missing" or noise is None or left is None:
@@ -59,7 +69,13 @@ whose friction steps once 1.8; 20 measured ones 0.7 to 1.5."""
 
 
 def unreliable(entry: Mapping[str, Any]) -> list[str]:
-    """Return why what was found of a joint may not hold, each in a sentence without its stop."""
+    """Return why what was found of a joint may not hold, each in a sentence without its stop.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
     # of nothing missing the headline says it
     far = far_from_noise(entry) if entry.get("verdict") == "closed" else None
     reasons = entry.get("fails"), _sealed_apart(entry), far, _unconfirmed(entry)
@@ -67,7 +83,13 @@ def unreliable(entry: Mapping[str, Any]) -> list[str]:
 
 
 def far_from_noise(entry: Mapping[str, Any]) -> str | None:
-    """Return that a loop that is said to lack no more leaves far more than noise, if it does."""
+    """Return that a loop of which no more is said to lack leaves far more than noise, if it does.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
     noise, left = entry.get("noise_a"), (entry.get("after") or {}).get("rmse_a")
     whole = entry.get("verdict") in ("closed", "nothing-missing")
     if not whole or not noise or not left or left <= FAR_ABOVE_NOISE * noise:
@@ -151,7 +173,13 @@ def loop_headline(loop: Mapping[str, Any]) -> str:
 
 
 def experiments(entry: Mapping[str, Any]) -> list[str]:
-    """Return the experiments that would separate what a loop could not tell apart."""
+    """Return the experiments that would separate what a loop could not tell apart.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
     return [
         f"To tell {step.get('effect')} from {', '.join(step.get('ties', ()))}: "
         f"{step['separating_experiment']}"
@@ -178,7 +206,13 @@ def set_aside(item: object) -> str:
 
 
 def remains(entry: Mapping[str, Any]) -> str:
-    """Return what a loop left unexplained, in one sentence."""
+    """Return what a loop left unexplained, in one sentence.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
     unit = entry.get("unit", "A")
     after = (entry.get("after") or {}).get("rmse_a")
     floor = entry.get("floor_a")

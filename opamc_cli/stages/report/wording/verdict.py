@@ -32,7 +32,10 @@ def by_state(verdict: Mapping[str, Any]) -> dict[str, list[int]]:
 def day_span(side: Mapping[str, Any]) -> str | None:
     """Return the days of a side's recordings, None where they are not known.
 
-    Of the verdict's `baseline` or `target`.
+    Parameters
+    ----------
+    side
+        The verdict's `baseline` or `target`.
     """
     days = [str(side[key])[:10] for key in ("from", "to") if side.get(key)]
     return " to ".join(dict.fromkeys(days)) or None
@@ -67,7 +70,15 @@ def headline(verdict: Mapping[str, Any]) -> str:
 
 
 def chance_phrase(entry: Mapping[str, Any], n_axes: int) -> str:
-    """Return how likely chance alone would do it, "less than 1 in 10 000" at the least."""
+    """Return how likely chance alone would do it, "less than 1 in 10 000" at the least.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    n_axes
+        Joints that were judged beside each other.
+    """
     p = entry.get("p_adjusted", entry.get("p_value"))
     if not isinstance(p, int | float) or not math.isfinite(p):
         return "by chance: not known"
@@ -82,7 +93,13 @@ def chance_phrase(entry: Mapping[str, Any], n_axes: int) -> str:
 
 
 def distance_phrase(entry: Mapping[str, Any]) -> str | None:
-    """Return how far a joint is from its baseline, None where that is not known."""
+    """Return how far a joint is from its baseline, None where that is not known.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
     ratio = (entry.get("distance") or {}).get("ratio")
     if not isinstance(ratio, int | float) or not math.isfinite(ratio):
         return None
@@ -101,7 +118,13 @@ def share_phrase(cause: Mapping[str, Any]) -> str | None:
 
 
 def inspection(entry: Mapping[str, Any]) -> str | None:
-    """Return what to look at first."""
+    """Return what to look at first.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
     state, cause = entry.get("state"), entry.get("cause")
     if state not in ("changed", "fault"):
         return None
@@ -120,7 +143,13 @@ def inspection(entry: Mapping[str, Any]) -> str | None:
 
 
 def likely_cause(entry: Mapping[str, Any]) -> list[str]:
-    """Return what probably changed, how much of it that explains, and what it may be instead."""
+    """Return what probably changed, how much of it that explains, and what it may be instead.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
     cause = entry.get("cause")
     if not cause:
         return []
@@ -141,7 +170,13 @@ def _meaning(cause: Mapping[str, Any]) -> tuple[str, bool, str]:
 
 
 def said_elsewhere(entry: Mapping[str, Any]) -> set[str]:
-    """Return the reasons of a joint that its card says under another heading."""
+    """Return the reasons of a joint that its card says under another heading.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
     cause = entry.get("cause") or {}
     meaning = cause.get("interpretation") or cause.get("effect")
     fixed = {FOUND.format(meaning), CHECK_FIRST.format(meaning), INSPECT}
@@ -149,7 +184,13 @@ def said_elsewhere(entry: Mapping[str, Any]) -> set[str]:
 
 
 def advice(entry: Mapping[str, Any]) -> str | None:
-    """Return what to do about an axis where its reasons do not already say it."""
+    """Return what to do about an axis where its reasons do not already say it.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
     cause = entry.get("cause") or {}
     for key in ("inspect", "action", "advice"):
         if cause.get(key):
@@ -164,7 +205,13 @@ def advice(entry: Mapping[str, Any]) -> str | None:
 
 
 def shared_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, list[int]]:
-    """Return the reasons that several axes have in common, with these axes, in their order."""
+    """Return the reasons that several axes have in common, with these axes, in their order.
+
+    Parameters
+    ----------
+    entries
+        Objects of the verdict's `axes`.
+    """
     axes: dict[str, list[int]] = {}
     for entry in entries:
         for reason in entry.get("reasons", ()):

@@ -30,7 +30,12 @@ class Layout:
 def text_layout(path: Path, encoding: str | None = None) -> Layout:
     """Return the layout under which most cells of a text table are numbers.
 
-    The text tells its encoding if none is given.
+    Parameters
+    ----------
+    path
+        The file.
+    encoding
+        Of its text, None where the text is to tell it.
 
     Raises
     ------

@@ -105,7 +105,12 @@ class Meant:
 def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
     """Return what the channels of a recording seem to be; those without a meaning are left out.
 
-    `counted`: numbers in names count axes; else they are part of a joint's name, as in `wrist_1`.
+    Parameters
+    ----------
+    listed
+        The channels.
+    counted
+        Numbers in names count axes; else they are part of a joint's name, as in `wrist_1`.
     """
     found: list[Meant] = []
     for channel in listed:

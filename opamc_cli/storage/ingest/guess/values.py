@@ -76,7 +76,12 @@ def angle_units(
 ) -> tuple[Guess, Guess]:
     """Return the units of positions and speeds.
 
-    By axis; speeds may be empty, and the rate, Hz, unknown.
+    Parameters
+    ----------
+    positions, speeds
+        Values by axis; speeds may be empty.
+    rate_hz
+        Samples per second, None where it is not known.
     """
     largest = max((_largest(values) for values in positions.values()), default=0.0)
     fastest = max((_largest(values) for values in speeds.values()), default=0.0)

@@ -49,8 +49,12 @@ class _Line:
 def guess_map(paths: Sequence[Path], encoding: str | None = None) -> str:
     """Return a map for recordings of one kind, as YAML with a comment for every line.
 
-    Channels are taken from the first, rates from all (the first twenty); a text tells its encoding
-    if none is given.
+    Parameters
+    ----------
+    paths
+        Recordings; channels are taken from the first, rates from all (the first twenty).
+    encoding
+        Of a text, None where the text is to tell it.
 
     Raises
     ------

@@ -87,9 +87,15 @@ def expand(
 ) -> dict[str, dict[str, Any]]:
     """Return a map's columns with one entry per axis instead of every placeholder.
 
-    Entries are by the run column's name, protected. Without a number of axes they are made for
-    every one that the file has a channel for, which may begin above 1 and have a gap: a joint keeps
-    its number.
+    Parameters
+    ----------
+    columns
+        Entries by the run column's name, protected.
+    axes
+        Number of axes; None: every one that the file has a channel for, which may begin above 1
+        and have a gap: a joint keeps its number.
+    exists
+        Whether the file has the channel of a filled entry.
     """
     result: dict[str, dict[str, Any]] = {}
     for name, entry in columns.items():

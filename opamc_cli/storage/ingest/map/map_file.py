@@ -126,8 +126,13 @@ def for_axes(
 ) -> IngestMap:
     """Return a map with a line for every axis instead of those with `{n}`.
 
-    What the recording offers tells the number of axes where the map does not, and which optional
-    channels are there; without it the map is for one axis that has them all.
+    Parameters
+    ----------
+    channels
+        The map.
+    listed
+        Returns what the recording offers: it tells the number of axes where the map does not,
+        and which optional channels are there. None: as for one axis that has them all.
     """
     several = any(has_placeholder(name) for name in channels.columns)
     if not several and not any(column.optional for column in channels.columns.values()):
@@ -158,7 +163,14 @@ def count_doubts(
 ) -> tuple[list[str], list[str]]:
     """Say where lines for all axes and the channels of a file do not count alike.
 
-    Of a map, and what `for_axes` made of it for this file.
+    Parameters
+    ----------
+    path
+        The file, for the sentences.
+    channels, own
+        The map, and what `for_axes` made of it for this file.
+    listed
+        What the file offers.
 
     Returns
     -------

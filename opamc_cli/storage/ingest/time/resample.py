@@ -30,8 +30,16 @@ def resample(
 ) -> Iterator[Block]:
     """Yield samples at start_s + k / rate_hz, k = 0 .. n_samples - 1.
 
-    Blocks are (strictly increasing stamps in s, columns of float64), in order; steps up to
-    `max_gap_s` are interpolated across, linearly everywhere unless `cubic`.
+    Parameters
+    ----------
+    blocks
+        (strictly increasing stamps in s, columns of float64), in order.
+    start_s, rate_hz, n_samples
+        The grid.
+    max_gap_s
+        Longest step that is interpolated across.
+    cubic
+        False: linear everywhere.
     """
     held_s: Float = np.empty(0)
     held: Block = {}
