@@ -49,24 +49,16 @@ Settings = Mapping[str, object]
 
 @dataclass(frozen=True)
 class Rows:
-    """A table and what goes with it.
-
-    Attributes
-    ----------
-    table
-        Arrow table; columns and units as in docs/formats.md.
-    path
-        Its file; None where it is made of another result.
-    notes
-        One sentence for each thing that is doubtful but was used.
-    errors
-        One for each run, or axis of a run, that could not be used.
-    """
+    """A table and what goes with it."""
 
     table: pa.Table
+    """Arrow table; columns and units as in docs/formats.md."""
     path: Path | None = None
+    """Its file; None where it is made of another result."""
     notes: tuple[str, ...] = ()
+    """One sentence for each thing that is doubtful but was used."""
     errors: tuple[OpamcError, ...] = ()
+    """One for each run, or axis of a run, that could not be used."""
 
     def to_pandas(self) -> Any:
         """Return the rows as a data frame.
@@ -85,15 +77,10 @@ class Rows:
 
 @dataclass(frozen=True)
 class RunRows(Rows):
-    """Samples of a run, with what it says of itself.
-
-    Attributes
-    ----------
-    info
-        Sampling rate, robot, program and so on.
-    """
+    """Samples of a run, with what it says of itself."""
 
     info: RunInfo | None = None
+    """Sampling rate, robot, program and so on."""
 
 
 @dataclass(frozen=True)
@@ -106,15 +93,7 @@ class Scores:
 
 @dataclass(frozen=True)
 class Diagnosis(Rows):
-    """A verdict: one row per axis, and all of verdict.json.
-
-    Attributes
-    ----------
-    verdict
-        Content of verdict.json.
-    report
-        The page.
-    """
+    """A verdict: one row per axis, all of verdict.json, and the page."""
 
     verdict: Mapping[str, Any] | None = None
     report: Path | None = None
@@ -122,13 +101,7 @@ class Diagnosis(Rows):
 
 @dataclass(frozen=True)
 class ClosedLoop(Rows):
-    """Closed loops: one row per axis and step, and all of loop.json.
-
-    Attributes
-    ----------
-    axes
-        Content of loop.json, one object per axis.
-    """
+    """Closed loops: one row per axis and step, and all of loop.json, one object per axis."""
 
     axes: tuple[Mapping[str, Any], ...] = ()
 

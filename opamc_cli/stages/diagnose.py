@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcError
-from opamc_cli.stages import report
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
@@ -206,6 +205,8 @@ def _diagnose(
     head = verdict.header(sources, every_note, out, tables)
     written = verdict.write(decided, scored, config, out, found, head)
     progress("report")
+    from opamc_cli.stages.report import assemble as report  # a mistake is told sooner without it
+
     title = config.report.title
     page = report.run(out, title=title, figures_of_healthy=figures_of_healthy, kept=kept)
     return DiagnoseOutcome(

@@ -138,8 +138,7 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
     InputError
         If an address cannot be listed.
     """
-    listed = (_remote if "://" in pattern else _local)(pattern, robots)
-    return _sorted(listed, pattern, robots)
+    return _sorted(_listed(pattern, robots), pattern, robots)
 
 
 def find_logs_and_strays(
@@ -149,15 +148,12 @@ def find_logs_and_strays(
 
     A path ends with what stands in the place of {night}; {robot} has to be in the pattern.
     """
-    listed = list((_remote if "://" in pattern else _local)(pattern, robots))
+    listed = [*_listed(pattern, robots)]
     strays = set()
     for path, _, _ in listed if "{night}" in pattern else ():
         found = None if fits(pattern, path) else _expression(pattern, A_NAME).fullmatch(path)
         if found is not None:
-            robot, path = (
-                NOT_IN_A_LINE.sub(NO_TEXT, text)
-                for text in (found["robot"], path[: found.end("night")])
-            )
+            robot, path = map(_in_a_line, (found["robot"], path[: found.end("night")]))
             if robots is None or robot in robots:
                 strays.add((robot, path))
     return _sorted(listed, pattern, robots), sorted(strays)
@@ -179,7 +175,7 @@ def find_unnamed(pattern: str, robots: tuple[str, ...]) -> list[tuple[str, str]]
     found: dict[str, str] = {}
     looked = set(robots)
     if "://" in pattern:
-        listed: Iterable[str] = (path for path, _, _ in _remote(pattern, robots))
+        listed: Iterable[str] = (path for path, _, _ in _remote(pattern))
     else:
         listed = glob.iglob(_wild(head), recursive=True)  # noqa: PTH207
     for at in sorted(listed):
@@ -196,9 +192,7 @@ def find_unnamed(pattern: str, robots: tuple[str, ...]) -> list[tuple[str, str]]
             below = glob.escape(at) + _wild(pattern[len(head) :], robot)
             inside = [*islice(glob.iglob(below, recursive=True), MOST_LOOKED_AT)]  # noqa: PTH207
         if any(fits(pattern, path) for path in inside):
-            found[NOT_IN_A_LINE.sub(NO_TEXT, robot)] = NOT_IN_A_LINE.sub(
-                NO_TEXT, at[: place.end("robot")]
-            )
+            found[_in_a_line(robot)] = _in_a_line(at[: place.end("robot")])
             looked.add(robot)
     return sorted(found.items())
 
@@ -242,15 +236,14 @@ def _as_logs(
 ) -> Iterator[LogFile]:
     expression = _expression(pattern)
     for path, size, mtime_ns in listed:
-        fits = expression.fullmatch(path)
-        if fits is None:
+        found = expression.fullmatch(path)
+        if found is None:
             continue
-        named = fits.groupdict()
-        robot, night = named.get("robot") or "", named.get("night")
-        path, robot = (NOT_IN_A_LINE.sub(NO_TEXT, text) for text in (path, robot))
+        named = found.groupdict()
+        robot, night = named.get("robot") or "", _as_night(named.get("night"))
+        path, robot = map(_in_a_line, (path, robot))
         if robots is not None and robot and robot not in robots:
             continue
-        night = _as_night(night)
         # one baseline may be of several robots
         for each in (robot,) if robot else robots or ():
             yield LogFile(path, each, night, size, mtime_ns)
@@ -320,6 +313,15 @@ def copy_name(log: LogFile) -> str:
     return f"{hashlib.sha256(told.encode()).hexdigest()}.parquet"
 
 
+def _in_a_line(text: str) -> str:
+    return NOT_IN_A_LINE.sub(NO_TEXT, text)
+
+
+def _listed(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
+    """Yield path, size and time in ns of what fits a pattern; at an address, of all below it."""
+    return _remote(pattern) if "://" in pattern else _local(pattern, robots)
+
+
 def _local(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
     for path in _fitting(pattern, robots):
         try:
@@ -346,22 +348,18 @@ def _closed(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str,
             yield path, 0, 0
 
 
-def _wild(pattern: str, robot: str = "*") -> str:
-    return pattern.replace("{night}", "*").replace(
-        "{robot}", robot if robot == "*" else glob.escape(robot)
-    )
+def _wild(pattern: str, robot: str | None = None) -> str:
+    named = "*" if robot is None else glob.escape(robot)
+    return pattern.replace("{night}", "*").replace("{robot}", named)
 
 
 def _fitting(pattern: str, robots: tuple[str, ...] | None) -> Iterator[str]:
-    wild = pattern.replace("{night}", "*")
-    names = [glob.escape(name) for name in robots] if robots is not None else ["*"]
-    for name in names if "{robot}" in wild else ["*"]:
+    for robot in robots if robots is not None and "{robot}" in pattern else (None,):
         # plain strings: tens of thousands of Path objects take a second
-        yield from glob.iglob(wild.replace("{robot}", name), recursive=True)  # noqa: PTH207
+        yield from glob.iglob(_wild(pattern, robot), recursive=True)  # noqa: PTH207
 
 
-def _remote(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
-    del robots
+def _remote(pattern: str) -> Iterator[tuple[str, int, int]]:
     scheme, _, rest = pattern.partition("://")
     fixed = re.split(r"[*?\[{]", rest, maxsplit=1)[0].rpartition("/")[0]
     try:

@@ -9,7 +9,7 @@ from typing import Any
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.files.result import published
-from opamc_cli.storage.runs.metadata import RunInfo, RunMetadata
+from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas.channels import same_clock
 from opamc_cli.storage.tables import table_record
@@ -123,7 +123,7 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
             path=_locate(published(table.parent) / entry["path"], entry["name"], moved_to),
             sha256=entry["sha256"],
             n_samples=entry["n_samples"],
-            info=RunInfo(**RunMetadata(**entry["info"]).model_dump()),
+            info=RunInfo(**entry["info"]),
         )
         for entry in record["runs"]
     )

@@ -9,7 +9,7 @@ inputs and config give the same bytes.
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from math import factorial
@@ -140,51 +140,50 @@ def read_table(path: Path, stage: str, schema: pa.Schema | None = None) -> pa.Ta
         raise InputError(msg)
     for field in schema or ():
         if field.name not in table.column_names:
-            msg = f"{path}: column {field.name} is missing; run `opamc {stage}` again"
-            raise InputError(msg)
-        if not table.schema.field(field.name).type.equals(field.type):
-            have = table.schema.field(field.name).type
-            msg = (
-                f"{path}: column {field.name} has type {have}, {field.type} is needed; "
-                f"run `opamc {stage}` again"
+            raise _edited(path, stage, f"column {field.name} is missing")
+        have = table.schema.field(field.name).type
+        if not have.equals(field.type):
+            raise _edited(
+                path, stage, f"column {field.name} has type {have}, {field.type} is needed"
             )
-            raise InputError(msg)
-    _check_rows(path, table, record, schema or ())
+    for why in _wrong_rows(table, record, schema or ()):
+        raise _edited(path, stage, why)
     return table
 
 
-def _check_rows(
-    path: Path, table: pa.Table, record: Mapping[str, Any], needed: Iterable[pa.Field]
-) -> None:
-    """Refuse rows that no stage writes: they were edited by hand."""
+def _edited(path: Path, stage: str, why: str) -> InputError:
+    """Refuse what no stage writes: it was edited by hand, or laid together."""
+    return InputError(f"{path}: {why}; run `opamc {stage}` again")
+
+
+def _wrong_rows(
+    table: pa.Table, record: Mapping[str, Any], needed: Iterable[pa.Field]
+) -> Iterator[str]:
+    """Yield what is wrong with rows."""
     for field in needed:
         n_null = table.column(field.name).null_count
         if n_null and field.name not in MAY_BE_NULL:
-            msg = (
-                f"{path}: column {field.name} is null in {n_null} of {table.num_rows} rows; "
-                f"run `opamc {record['stage']}` again"
-            )
-            raise InputError(msg)
+            yield f"column {field.name} is null in {n_null} of {table.num_rows} rows"
     for field in needed:
         if table.num_rows:
-            _check_values(path, table.column(field.name), field.name, record)
+            yield from _wrong_values(table.column(field.name), field.name)
     if "segment" in table.column_names and "role" not in table.column_names:
-        _check_segments(path, table, record)
+        yield from _wrong_segments(table)
     if "counts" in table.column_names and "order" in table.column_names:
-        _check_counts(path, table, record)
+        lengths = pc.list_value_length(table["counts"]).to_pylist()
+        for length, order in zip(lengths, table["order"].to_pylist(), strict=True):
+            if length != factorial(order):
+                there_are = f"there are {factorial(order)} patterns"
+                yield f"counts of order {order} are {length}, {there_are}"
     if "runs" in record and "run" in table.column_names:
         known = {entry["name"] for entry in record["runs"]}
         for name in table.column("run").unique().to_pylist():
             if name not in known:
-                msg = (
-                    f"{path}: names run {name!r}, it was made from {', '.join(sorted(known))}; "
-                    f"run `opamc {record['stage']}` again"
-                )
-                raise InputError(msg)
+                yield f"names run {name!r}, it was made from {', '.join(sorted(known))}"
 
 
-def _check_segments(path: Path, table: pa.Table, record: Mapping[str, Any]) -> None:
-    """Refuse segments that stand twice or not in their order, as of tables laid together."""
+def _wrong_segments(table: pa.Table) -> Iterator[str]:
+    """Yield that segments stand twice or not in their order, as of tables laid together."""
     names = {"run", "axis", "motion", "order"}.intersection(table.column_names)
     if not {"run", "axis"} <= names:
         return
@@ -192,17 +191,11 @@ def _check_segments(path: Path, table: pa.Table, record: Mapping[str, Any]) -> N
     rows = np.lexsort(keys)  # stable
     same_axis = np.all([np.diff(key[rows]) == 0 for key in keys], axis=0)
     if np.any(same_axis & (np.diff(table["segment"].to_numpy()[rows]) <= 0)):
-        msg = (
-            f"{path}: has segments of an axis twice or not in their order; "
-            f"run `opamc {record['stage']}` again"
-        )
-        raise InputError(msg)
+        yield "has segments of an axis twice or not in their order"
 
 
-def _check_values(
-    path: Path, column: pa.ChunkedArray, name: str, record: Mapping[str, Any]
-) -> None:
-    """Refuse numbers that no stage writes."""
+def _wrong_values(column: pa.ChunkedArray, name: str) -> Iterator[str]:
+    """Yield the numbers that are not possible."""
     values = pc.list_flatten(column) if pa.types.is_list(column.type) else column
     if not (pa.types.is_integer(values.type) or pa.types.is_floating(values.type)):
         return
@@ -211,35 +204,12 @@ def _check_values(
         low = 0
     if name == "order" and pa.types.is_floating(values.type):
         low, high = 0, LARGEST  # of a line over the angle, not of patterns
-    smallest, largest = (_known(values, find) for find in (pc.min, pc.max))
-    for value in (smallest, largest):
-        if value is not None and not low <= value <= high:
-            msg = (
-                f"{path}: column {name} holds {value:g}, {low:g} to {high:g} is possible; "
-                f"run `opamc {record['stage']}` again"
-            )
-            raise InputError(msg)
-
-
-def _known(values: pa.ChunkedArray, find: Any) -> float | None:
     if pa.types.is_floating(values.type):
         # an unknown number is NaN in some columns
         values = values.filter(pc.invert(pc.is_nan(values)))
-    found = find(values).as_py()
-    return None if found is None else float(found)
-
-
-def _check_counts(path: Path, table: pa.Table, record: Mapping[str, Any]) -> None:
-    """Refuse counts that are not of their order's patterns."""
-    lengths = pc.list_value_length(table["counts"]).to_pylist()
-    orders = table["order"].to_pylist()
-    for length, order in zip(lengths, orders, strict=True):
-        if length != factorial(order):
-            msg = (
-                f"{path}: counts of order {order} are {length}, there are {factorial(order)} "
-                f"patterns; run `opamc {record['stage']}` again"
-            )
-            raise InputError(msg)
+    for value in pc.min_max(values).as_py().values():
+        if value is not None and not low <= value <= high:
+            yield f"column {name} holds {float(value):g}, {low:g} to {high:g} is possible"
 
 
 def table_record(path: Path, metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
@@ -322,11 +292,8 @@ def check_current(path: Path) -> None:
         beside = path.parent / source["path"]
         own_folder = beside.parent == path.parent
         if own_folder and beside.is_file() and file_sha256(beside) != source["sha256"]:
-            msg = (
-                f"{path}: was made from another {beside.name} than the one beside it; "
-                f"run `opamc {record['stage']}` again"
-            )
-            raise InputError(msg)
+            why = f"was made from another {beside.name} than the one beside it"
+            raise _edited(path, record["stage"], why)
 
 
 def table_input(path: Path) -> tuple[Path, str]:

@@ -8,6 +8,7 @@ import pytest
 
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.stages import diagnose as stage
+from opamc_cli.stages.report import assemble
 from opamc_cli.storage.files import result as storage
 from opamc_cli.storage.files.result import clear, published, result
 
@@ -193,7 +194,7 @@ def test_no_verdict_is_seen_before_the_last_one(baseline, tonight, tmp_path, mon
 
     seen_files = []
     monkeypatch.setattr(
-        stage.report,
+        assemble,
         "run",
         lambda out, **_: seen_files.append(tree(tmp_path / "out")) or pytest.fail("stop"),
     )

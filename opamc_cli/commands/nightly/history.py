@@ -180,6 +180,3 @@ def _export(path: Path, rows: list[dict[str, Any]], table: str) -> None:
             pyarrow.csv.write_csv(made, temporary)
         else:
             pyarrow.parquet.write_table(made, temporary)
-
-
-__all__ = ["DEFAULT_CELL", "history"]

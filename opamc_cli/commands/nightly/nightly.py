@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 
 from opamc_cli.commands.terminal.options import Jobs, Json, Quiet
 from opamc_cli.commands.terminal.output import Output
-from opamc_cli.errors import OpamcError, UsageError
+from opamc_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from opamc_cli.config.cell import CellConfig
@@ -139,9 +139,7 @@ def run(
         output.result(
             {
                 **morning.values,
-                "absent": outcome.absent,
-                "strays": [stray.time for stray in outcome.strays],
-                "unnamed": [one.robot for one in outcome.unnamed],
+                **_beside(outcome),
                 "page": str(page),
             },
             *morning.lines,
@@ -154,6 +152,15 @@ def run(
             history.record_news(one)
         history.tell([*untold, *standing, *now], no_more=[*stood, *no_more])
     raise typer.Exit(morning.exit_code)
+
+
+def _beside(outcome: Any) -> dict[str, list[str]]:
+    """Return what no night tells of, for `--json`."""
+    return {
+        "absent": outcome.absent,
+        "strays": [stray.time for stray in outcome.strays],
+        "unnamed": [one.robot for one in outcome.unnamed],
+    }
 
 
 def _print_plan(output: Output, outcome: Any) -> None:
@@ -171,9 +178,7 @@ def _print_plan(output: Output, outcome: Any) -> None:
                 for night in todo
             ],
             "done": len(outcome.planned) - len(todo),
-            "absent": outcome.absent,
-            "strays": [stray.time for stray in outcome.strays],
-            "unnamed": [one.robot for one in outcome.unnamed],
+            **_beside(outcome),
         },
         *outcome.absent,
         *(f"{stray.robot} {stray.text}" for stray in outcome.strays),
@@ -324,6 +329,3 @@ def _today() -> date:
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-__all__ = ["OpamcError", "app"]

@@ -39,7 +39,7 @@ def report(
     from opamc_cli.commands.terminal.tables import feature_table, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.errors import InputError
-    from opamc_cli.stages import report as stage
+    from opamc_cli.stages.report import assemble as stage
     from opamc_cli.storage.files.lock import output_lock
 
     settings = load_config(config, overrides or ())

@@ -96,12 +96,6 @@ def held_for(x: NDArray[np.floating]) -> int | None:
     return usual if usual >= LEAST_HELD and even and not coarse else None
 
 
-def is_constant(x: NDArray[np.floating]) -> bool:
-    """Whether all known samples of a channel, (n,), are equal (true if there are none)."""
-    known = x[np.isfinite(x)]
-    return not known.size or bool(known.min() == known.max())
-
-
 @dataclass(frozen=True)
 class Limit:
     """Of one quantity of a joint, by its size."""

@@ -212,8 +212,10 @@ def _analyse(job: _Job) -> dict[str, pa.Table]:
         # cut short, a segment's parts would not be those of the others
         if whole:
             course = bridged(current)
+            place = {name: row[name] for name in PLACE}
             for witness in WITNESSES:
-                kept[witness.FILE_NAME] += witness.rows(row, course, fs_hz, config)
+                if columns := witness.kept(course, fs_hz, config):
+                    kept[witness.FILE_NAME].append({**place, **columns})
     patterns.sort(key=lambda row: (row["segment"], row["order"]))
     return {
         files.PATTERNS: pa.Table.from_pylist(patterns, schema=PATTERNS),

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -199,23 +198,13 @@ def separating_experiment(name: str, ties: tuple[str, ...]) -> str | None:
     return "move over more of the travel, at more speeds and accelerations, in both directions"
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A partial residual over its own covariate."""
+def curve_of(fit: Fit, place: int) -> dict[str, Any]:
+    """Draw an effect and the residual over the effect's covariate: an object of loop.json.
 
-    covariate: str
-    unit: str
-    """With `covariate`: what it is drawn over."""
-    x: Floats
-    residual_a: Floats
-    named_a: Floats
-    """With `x`, `residual_a`: bins of equally many samples: the covariate's mean, the mean of what
-    the effect and the final residual hold together, and of what the effect holds. Where friction
-    resists, both are taken times the direction; s of shape (k,)."""
-
-
-def curve_of(fit: Fit, place: int) -> Curve:
-    """Draw an effect and the residual over the effect's covariate."""
+    In bins of equally many samples: the covariate's mean, the mean of what the effect and the final
+    residual hold together, and of what the effect holds. Where friction resists, both are taken
+    times the direction.
+    """
     dataset = fit.dataset
     grid = dataset.sharp
     term, values = fit.terms[place], fit.coefficients[place]
@@ -231,13 +220,12 @@ def curve_of(fit: Fit, place: int) -> Curve:
     over, side = over[rows], side[rows]
     order = np.argsort(over, kind="stable")
     bins = [piece for piece in np.array_split(order, POINTS) if piece.size]
-    return Curve(
-        name,
-        unit,
-        np.array([over[piece].mean() for piece in bins]),
-        np.array([(side * both)[piece].mean() for piece in bins]),
-        np.array([(side * named)[piece].mean() for piece in bins]),
-    )
+    drawn = {"x": over, "residual_a": side * both, "named_a": side * named}
+    return {
+        "covariate": name,
+        "unit": unit,
+        **{key: [values[piece].mean() for piece in bins] for key, values in drawn.items()},
+    }
 
 
 def order_ties(order: float, track: Track) -> list[str]:
@@ -260,7 +248,7 @@ def order_ties(order: float, track: Track) -> list[str]:
 
 def step_entry(step: Step, loop: Loop, track: Track) -> dict[str, Any]:
     """One entry of `steps`; ripples whose orders the travel cannot tell apart are tied."""
-    curve = curve_of(loop.after, [term is step.term for term in loop.after.terms].index(True))
+    place = [term is step.term for term in loop.after.terms].index(True)
     order = step.term.parameters.get("order")
     ties = list(step.ties)
     if order is not None:
@@ -285,11 +273,8 @@ def step_entry(step: Step, loop: Loop, track: Track) -> dict[str, Any]:
         "rmse_before_a": step.rmse_before_a,
         "rmse_after_a": step.rmse_after_a,
         "curve": {
-            "covariate": curve.covariate,
-            "unit": curve.unit,
-            "x": [float(f"{x:.6g}") for x in curve.x],
-            "residual_a": [float(f"{y:.6g}") for y in curve.residual_a],
-            "named_a": [float(f"{y:.6g}") for y in curve.named_a],
+            key: said if isinstance(said, str) else [float(f"{value:.6g}") for value in said]
+            for key, said in curve_of(loop.after, place).items()
         },
     }
 

@@ -11,9 +11,10 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import pyarrow as pa
@@ -40,22 +41,6 @@ UNKNOWN = object()
 """What `KeptResults.find` returns where nothing is kept; None may be a result."""
 
 
-@dataclass(frozen=True)
-class _Remembered(Generic[Job, Result]):
-    """A function that computes nothing twice; importable by workers, unlike a closure."""
-
-    function: Callable[[Job], Result]
-    kept: "KeptResults"
-
-    def __call__(self, job: Job) -> Result:
-        known = self.kept.find(self.function, job)
-        if known is not UNKNOWN:
-            return cast(Result, known)
-        result = self.function(job)
-        self.kept.keep(self.function, job, result)
-        return result
-
-
 def remembered(
     function: Callable[[Job], Result], kept: "KeptResults | None"
 ) -> Callable[[Job], Result]:
@@ -68,7 +53,16 @@ def remembered(
     kept
         Where results lie; None: the function itself is returned.
     """
-    return function if kept is None else _Remembered(function, kept)
+    return function if kept is None else partial(_found_or_made, function, kept)
+
+
+def _found_or_made(function: Callable[[Job], Result], kept: "KeptResults", job: Job) -> Result:
+    known = kept.find(function, job)
+    if known is not UNKNOWN:
+        return cast(Result, known)
+    result = function(job)
+    kept.keep(function, job, result)
+    return result
 
 
 class KeptResults:

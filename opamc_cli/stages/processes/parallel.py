@@ -7,15 +7,13 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import active_children, get_context, parent_process
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from opamc_cli.errors import OpamcError, UsageError
 from opamc_cli.stages.processes.interruption import held_back
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -52,6 +50,10 @@ class Outcome(Generic[Result]):
     results: tuple[Result, ...]
     errors: tuple[OpamcError, ...]
 
+    def __add__(self, other: "Outcome[Result]") -> "Outcome[Result]":
+        """Return these and those of the items behind them."""
+        return Outcome(self.results + other.results, self.errors + other.errors)
+
 
 def map_items(
     function: Callable[[Item], Result],
@@ -80,7 +82,7 @@ def map_items(
         return _as_it_pays(function, items, watch)
     workers = min(jobs, len(items))
     if workers <= 1:
-        return _gather([_Immediate(function, item) for item in items], watch)
+        return _gather([partial(function, item) for item in items], watch)
     from concurrent.futures import ProcessPoolExecutor  # who works alone does without
     from concurrent.futures.process import BrokenProcessPool
 
@@ -88,7 +90,7 @@ def map_items(
     try:
         with one_thread_each():
             with held_back():
-                calls = [pool.submit(function, item) for item in items]
+                calls = [pool.submit(function, item).result for item in items]
             return _gather(calls, watch)
     except BrokenProcessPool as error:
         msg = "a worker process was killed, most often for want of memory; use fewer --jobs"
@@ -125,20 +127,21 @@ def _as_it_pays(
 ) -> Outcome[Result]:
     """Work on item after item here, until what is left is worth starting workers for."""
     cores = os.cpu_count() or 1
-    done: list[_Immediate[Item, Result]] = []
-    for k, item in enumerate(items):
+    done, left = Outcome[Result]((), ()), items
+    while left:
+        k = len(items) - len(left)
         watch(k, len(items))
-        call = _Immediate(function, item)
         begun = perf_counter()
-        call.settle()
-        done.append(call)
-        left = items[k + 1 :]
+        done += _gather([partial(function, left[0])], unwatched)
+        left = left[1:]
         # the first item pays for what is loaded once
         if k and cores > 1 and (perf_counter() - begun) * len(left) > START_S:
-            first = _gather(done, unwatched)
-            rest = map_items(function, left, cores, lambda n, _: watch(len(done) + n, len(items)))
-            return Outcome(first.results + rest.results, first.errors + rest.errors)
-    return _gather(done, watch)
+            break
+    n_here = len(items) - len(left)
+    if left:
+        return done + map_items(function, left, cores, lambda n, _: watch(n_here + n, len(items)))
+    watch(n_here, len(items))
+    return done
 
 
 def die_with(parent: int) -> None:
@@ -165,39 +168,13 @@ def _watch_parent() -> None:
 _PR_SET_PDEATHSIG = 1
 
 
-class _Immediate(Generic[Item, Result]):
-    """A call that is made when its result is asked for."""
-
-    def __init__(self, function: Callable[[Item], Result], item: Item) -> None:
-        self._function = function
-        self._item = item
-        self._settled: list[Result] = []
-        self._error: OpamcError | None = None
-
-    def settle(self) -> None:
-        """Make the call now, and keep what comes of it."""
-        try:
-            self._settled.append(self._function(self._item))
-        except OpamcError as error:
-            self._error = error
-
-    def result(self) -> Result:
-        if self._error is not None:
-            raise self._error
-        return self._settled[0] if self._settled else self._function(self._item)
-
-
-def _gather(
-    calls: "Sequence[Future[Result]] | Sequence[_Immediate[Item, Result]]",
-    watch: Watch,
-) -> Outcome[Result]:
+def _gather(calls: Sequence[Callable[[], Result]], watch: Watch) -> Outcome[Result]:
     results: list[Result] = []
     errors: list[OpamcError] = []
-    pending: Sequence[Future[Result] | _Immediate[Any, Result]] = calls
-    for done, call in enumerate(pending):
+    for done, call in enumerate(calls):
         watch(done, len(calls))
         try:
-            results.append(call.result())
+            results.append(call())
         except OpamcError as error:
             errors.append(error)
     watch(len(calls), len(calls))

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,11 @@ from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import write_table
 from opamc_cli.testbed.effects import KINDS
-from opamc_cli.testbed.parameters import Damage
 from opamc_cli.testbed.robot import AxisRecording, Recording, simulate
 
 STAGE = "simulate"
 TRUTH_FOLDER = "truth"
+DAMAGE = ("severity", "share", "gap_rad", "stiffness_loss")
 _FIRST_DAY = datetime(2021, 1, 1, tzinfo=UTC)
 """Sessions are one day apart from here: a recording's bytes must not depend on the clock."""
 
@@ -157,7 +157,10 @@ def truth_entry(name: str, session: int, recording: Recording) -> dict[str, Any]
         "run": name,
         "session": session,
         "n_samples": len(next(iter(recording.axes.values())).iq_a),
-        "faults": [_fault(axis, damage) for axis, damage in sorted(recording.faults.items())],
+        "faults": [
+            {"axis": axis, **{name: getattr(damage, name) for name in DAMAGE}}
+            for axis, damage in sorted(recording.faults.items())
+        ],
         "effects": [
             {
                 "axis": effect.axis,
@@ -168,16 +171,7 @@ def truth_entry(name: str, session: int, recording: Recording) -> dict[str, Any]
             }
             for effect in recording.effects
         ],
-        "segments": [
-            {
-                "axis": s.axis,
-                "cycle": s.cycle,
-                "motion": s.motion,
-                "start": s.start,
-                "stop": s.stop,
-            }
-            for s in recording.segments
-        ],
+        "segments": [asdict(segment) for segment in recording.segments],
         "start_temperature_c": {
             str(axis): round(session_.temperature_c, 3)
             for axis, session_ in recording.sessions.items()
@@ -210,16 +204,6 @@ def _columns(axis: int, signals: AxisRecording, wanted: Sequence[str]) -> dict[s
     if "temperature" in wanted:
         columns[f"axis{axis}_temperature"] = signals.temperature_c
     return columns
-
-
-def _fault(axis: int, damage: Damage) -> dict[str, Any]:
-    return {
-        "axis": axis,
-        "severity": damage.severity,
-        "share": damage.share,
-        "gap_rad": damage.gap_rad,
-        "stiffness_loss": damage.stiffness_loss,
-    }
 
 
 def _program_name(config: TestbedConfig) -> str:

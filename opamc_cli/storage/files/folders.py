@@ -1,13 +1,12 @@
 """Folders of results that are either whole or not there."""
 
-import os
 import shutil
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from opamc_cli.errors import UsageError
-from opamc_cli.storage.files.atomic import ensure_directory
+from opamc_cli.storage.files.atomic import ensure_directory, flush
 
 
 def replace_folder(
@@ -33,8 +32,7 @@ def replace_folder(
     """
     _require_own(folder, of)
     ensure_directory(folder.parent)
-    staged = folder.parent / f".{folder.name}.part"
-    old = folder.parent / f".{folder.name}.old"
+    staged, old = _beside(folder)
     try:
         for left in (staged, old):
             if left.exists():
@@ -43,16 +41,14 @@ def replace_folder(
         for name, content in sorted(files.items()):
             path = staged / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
+            path.write_bytes(content)
+            flush(path)
         for place in {(staged / name).parent for name in files}:
-            flush_folder(place)
+            flush(place)
         if folder.exists():
             folder.rename(old)
         staged.rename(folder)
-        flush_folder(folder.parent)
+        flush(folder.parent)
         shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         with suppress(OSError):
@@ -80,16 +76,17 @@ def remove_folder(folder: Path, *, of: Collection[str] | None = None) -> None:
     """
     _require_own(folder, of)
     try:
-        for place in (
-            folder,
-            folder.parent / f".{folder.name}.part",
-            folder.parent / f".{folder.name}.old",
-        ):
+        for place in (folder, *_beside(folder)):
             if place.exists():
                 shutil.rmtree(place)
     except OSError as error:
         msg = f"{folder}: cannot be removed ({error.strerror or error}); check permissions"
         raise UsageError(msg) from error
+
+
+def _beside(folder: Path) -> tuple[Path, Path]:
+    """Return where a folder is made, and where the one before it goes."""
+    return folder.parent / f".{folder.name}.part", folder.parent / f".{folder.name}.old"
 
 
 def _require_own(folder: Path, of: Collection[str] | None) -> None:
@@ -100,14 +97,3 @@ def _require_own(folder: Path, of: Collection[str] | None) -> None:
         if path.name not in of and not path.is_dir():
             msg = f"{path}: would be removed and is no result; choose another folder for `out`"
             raise UsageError(msg)
-
-
-def flush_folder(folder: Path) -> None:
-    """Have a folder's list of names on the disk before going on."""
-    if not folder.exists():
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -44,6 +44,9 @@ from opamc_cli.storage.history.rows import (
 BUSY_S = 60.0
 """Another process may be writing: its transactions last milliseconds."""
 
+UNTOLD = "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)"
+"""What makes news of an event again, by its key."""
+
 Row = TypeVar("Row")
 
 
@@ -304,7 +307,7 @@ class History:
             return
         if replaces:
             self._db.execute(f"DELETE FROM event WHERE {where}", key)
-        self._db.execute("DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", key)
+        self._db.execute(UNTOLD, key)
         self._put("event", events if replaces else new)
 
     def record_news(self, event: Event) -> None:
@@ -381,9 +384,7 @@ class History:
             # programs share their axis' key: what one of them says later is news
             before, after = Counter(map(_key, said)), Counter(map(_key, found))
             joined = [key for key, n in after.items() if n > before[key] > 0]
-            self._db.executemany(
-                "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", joined
-            )
+            self._db.executemany(UNTOLD, joined)
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 
     def replace_missing(self, events: Iterable[Event]) -> None:
@@ -469,9 +470,7 @@ class History:
         """Remember that somebody was told, and that something is so `no_more`."""
         told, over = ([_key(one) for one in said] for said in (events, no_more))
         with self.transaction():
-            self._db.executemany(
-                "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", over
-            )
+            self._db.executemany(UNTOLD, over)
             self._db.executemany("INSERT OR IGNORE INTO told VALUES (?, ?, ?, ?)", told)
 
     def reports(self) -> dict[str, dict[str, list[str]]]:

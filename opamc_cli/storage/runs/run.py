@@ -178,8 +178,7 @@ class Run:
                 start = self._row_group_starts[group]
                 self._recent[group, name] = self._samples(name, table.column(name), start)
         found = {name: self._recent[group, name] for name in columns}
-        kept = max(RECENT_GROUPS * len(columns), len(columns))
-        while len(self._recent) > kept:
+        while len(self._recent) > RECENT_GROUPS * len(columns):
             self._recent.pop(next(iter(self._recent)))
         return found
 

@@ -11,7 +11,6 @@ from opamc_cli.signal.plausible.quality import (
     bridged,
     clipped_share,
     held_for,
-    is_constant,
     spikes,
     strided_speed,
 )
@@ -90,13 +89,6 @@ def test_a_channel_that_comes_less_often_than_its_rows_is_told(rows):
 )
 def test_a_channel_of_its_own_rate_is_not_held(own):
     assert held_for(own) is None
-
-
-def test_constants():
-    assert is_constant(np.full(10, 2.0))
-    assert is_constant(np.array([np.nan, 1.0, np.nan]))
-    assert is_constant(np.zeros(0))
-    assert not is_constant(np.array([1.0, 1.1]))
 
 
 def test_numbers_that_no_joint_has_are_told_from_disturbances():

@@ -9,7 +9,6 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import spectrum
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
-from opamc_cli.storage.schemas.tables import PLACE
 
 RATE_HZ = 250.0
 CYCLES, MOTION, REST = 4, 400, 150
@@ -66,10 +65,9 @@ def test_a_reported_current_keeps_its_sign_in_its_spectrum():
     """Moved by a hundredth of an ampere it passes zero elsewhere, and that is no fluctuation."""
     rng = np.random.default_rng(0)
     current = np.cos(np.pi * np.arange(800) / 800) + 1e-3 * rng.normal(size=800)
-    place = dict.fromkeys(PLACE, 0)
     config = load_config().patterns
     power = [
-        np.array(spectrum.rows(place, current + offset, RATE_HZ, config)[0]["log_power"])
+        np.array(spectrum.kept(current + offset, RATE_HZ, config)["log_power"])
         for offset in (0.0, 0.01)
     ]
     np.testing.assert_allclose(*power, atol=0.01)

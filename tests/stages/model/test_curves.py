@@ -43,7 +43,9 @@ def drawn(domain, track=TRACK, inside=None, of=None):
         coefficients=(None, np.array([2.0, -1.0])),
         residual_a=RESIDUAL,
     )
-    return curve_of(fit, 1)
+    curve = curve_of(fit, 1)
+    numbers = {key: np.array(curve[key]) for key in ("x", "residual_a", "named_a")}
+    return SimpleNamespace(**curve | numbers)
 
 
 @pytest.mark.parametrize(

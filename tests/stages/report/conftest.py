@@ -7,7 +7,7 @@ from pathlib import Path
 import output_folder
 import pytest
 
-from opamc_cli.stages import report
+from opamc_cli.stages.report import assemble as report
 
 NOTE = "payload_kg differs: normal-0 has 0.0, fault-0 2.0"
 

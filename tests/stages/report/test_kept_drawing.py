@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from opamc_cli.config.models import SegmentConfig
-from opamc_cli.stages import report
 from opamc_cli.stages.processes.kept import KeptResults
+from opamc_cli.stages.report import assemble as report
 from opamc_cli.stages.report.figures import motion_signal
 from opamc_cli.stages.report.results.inputs import read_inputs
 

@@ -11,7 +11,7 @@ import pytest
 from output_folder import Plan
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages import report
+from opamc_cli.stages.report import assemble as report
 from opamc_cli.stages.report.figures import shown
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}

@@ -243,12 +243,12 @@ def _luminance(hexadecimal: str) -> float:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 6])
-def test_each_added_effect_has_a_panel_and_nothing_else_has(monkeypatch, count):
+def test_each_added_effect_has_a_panel_and_nothing_else_has(count):
     curve = {"covariate": "speed", "unit": "rad/s"}
     curve |= {key: [0.0, 1.0, 2.0] for key in ("x", "residual_a", "named_a")}
     steps = [{"effect": "stribeck", "parameters": {}, "curve": curve}] * count
-    monkeypatch.setattr(partial_residuals, "loop_axis", lambda inputs, axis: {"steps": steps})
-    drawn = partial_residuals.figure(SimpleNamespace(unit="A"), 1)
+    inputs = SimpleNamespace(unit="A", loop_axis=lambda axis: {"steps": steps})
+    drawn = partial_residuals.figure(inputs, 1)
     assert drawn.svg.count(">speed (rad/s)<") == count
     assert drawn.svg.count("<clipPath") == count
 

@@ -3,7 +3,7 @@
 import pytest
 
 from opamc_cli.errors import UsageError
-from opamc_cli.storage.files.folders import flush_folder, remove_folder, replace_folder
+from opamc_cli.storage.files.folders import remove_folder, replace_folder
 
 
 def contents(folder):
@@ -51,7 +51,3 @@ def test_what_is_no_result_is_not_taken_away(tmp_path):
     log.unlink()
     replace_folder(log.parents[1], {"a.txt": b"1"}, of={"a.txt"})
     assert contents(tmp_path / "night") == {"a.txt": b"1"}
-
-
-def test_a_folder_that_is_not_there_needs_no_flush(tmp_path):
-    flush_folder(tmp_path / "none")

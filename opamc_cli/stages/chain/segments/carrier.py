@@ -30,6 +30,7 @@ from opamc_cli.signal.transform.analytic import (
 )
 from opamc_cli.signal.transform.wavelet import Morse
 from opamc_cli.stages.chain.segments.rows import (
+    STILL_SHARE,
     AxisSegments,
     Gaps,
     Segment,
@@ -59,8 +60,6 @@ LOST_SHARE = 0.25
 """Of its largest frequency: a carrier that ends faster than that did not end, but was lost."""
 STEADY_S = 0.25
 """Least time for which a recording that never stands still has to keep its largest frequency."""
-STILL_SHARE = 0.05
-"""A recording that stands still for less than this share never stands still."""
 
 Complex = npt.NDArray[np.complexfloating]
 Floats = npt.NDArray[np.floating]

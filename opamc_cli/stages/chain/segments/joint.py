@@ -17,6 +17,7 @@ from opamc_cli.signal.motion.signs import lacks_sign
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.plausible.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
+    STILL_SHARE,
     AxisSegments,
     Gaps,
     Segment,
@@ -35,9 +36,6 @@ of robot arms have 50 to 160. Delays are chosen by the current itself, see stage
 
 SLOWER = 0.5
 """Share of samples at which a channel has numbers: with fewer it is logged at a lower rate."""
-
-STILL_SHARE = 0.05
-"""A recording that stands still for less than this share never stands still."""
 
 
 def joint_segments(

@@ -15,6 +15,9 @@ from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 EDGE_S = 0.05
 """A motion this near to the recording's edge, or to a gap of this length, may be cut by it."""
 
+STILL_SHARE = 0.05
+"""A recording that stands still for less than this share never stands still."""
+
 
 @dataclass(frozen=True)
 class Segment:

@@ -3,7 +3,6 @@
 A further witness is one module with what `Witness` asks for, and its name in `WITNESSES`.
 """
 
-from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -28,14 +27,10 @@ class Witness(Protocol):
     SCHEMA: pa.Schema
     """Of its table; `run`, `axis`, `cycle`, `motion` and `segment` say what a row is of."""
 
-    def rows(
-        self,
-        place: Mapping[str, Any],
-        current: npt.NDArray[np.floating],
-        fs_hz: float,
-        config: PatternsConfig,
-    ) -> list[dict[str, Any]]:
-        """Return what is kept of a segment, from its current: signed, or an envelope."""
+    def kept(
+        self, current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig
+    ) -> dict[str, Any]:
+        """Return its columns of a segment, from its current: signed, or an envelope; or none."""
 
     def evidence(
         self, baseline: pa.Table, target: pa.Table, axis: int, names: Names

@@ -1,6 +1,5 @@
 """Fourth witness: how large the current of a motion is."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,26 +12,18 @@ from opamc_cli.decision.witnesses.deviation import variance_within_sessions
 from opamc_cli.signal.amplitude import log_amplitudes
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.schemas.tables import AMPLITUDES, PLACE
+from opamc_cli.storage.schemas.tables import AMPLITUDES
 
 NAME = "amplitude"
 FILE_NAME = files.AMPLITUDES
 SCHEMA = AMPLITUDES
 
 
-def rows(
-    place: Mapping[str, Any],
-    current: npt.NDArray[np.floating],
-    fs_hz: float,
-    config: PatternsConfig,
-) -> list[dict[str, Any]]:
+def kept(current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig) -> dict[str, Any]:
     """Return the log amplitudes of a segment; none if one of its samples is unknown."""
     del fs_hz, config
     amplitudes = log_amplitudes(current)
-    if not amplitudes.size:
-        return []
-    own = {name: place[name] for name in PLACE}
-    return [{**own, "parts": amplitudes.size, "log_amplitude": amplitudes}]
+    return {"parts": amplitudes.size, "log_amplitude": amplitudes} if amplitudes.size else {}
 
 
 def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> AmplitudeEvidence:

@@ -1,6 +1,5 @@
 """Third witness: the course of the current over a motion."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,26 +11,18 @@ from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.signal.course import mean_course
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.schemas.tables import PLACE, PROFILES
+from opamc_cli.storage.schemas.tables import PROFILES
 
 NAME = "profile"
 FILE_NAME = files.PROFILES
 SCHEMA = PROFILES
 
 
-def rows(
-    place: Mapping[str, Any],
-    current: npt.NDArray[np.floating],
-    fs_hz: float,
-    config: PatternsConfig,
-) -> list[dict[str, Any]]:
+def kept(current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig) -> dict[str, Any]:
     """Return the mean current in each part of a segment; none if it is too short for any."""
     del fs_hz
     course = mean_course(current, config.parts)
-    if not course.size:
-        return []
-    own = {name: place[name] for name in PLACE}
-    return [{**own, "parts": course.size, "current_a": course}]
+    return {"parts": course.size, "current_a": course} if course.size else {}
 
 
 def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> ProfileEvidence:

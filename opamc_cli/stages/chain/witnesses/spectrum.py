@@ -1,6 +1,5 @@
 """Second witness: the short-time spectrum of the envelope, or of a reported current."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +13,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.signal.transform.short_time import short_time_log_power
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.schemas.tables import PLACE, SPECTRA
+from opamc_cli.storage.schemas.tables import SPECTRA
 
 NAME = "spectrum"
 FILE_NAME = files.SPECTRA
@@ -24,26 +23,20 @@ LEAST_LOG_POWER = -1.0
 """Beside the median of all sessions: what is below counts as this."""
 
 
-def rows(
-    place: Mapping[str, Any],
-    current: npt.NDArray[np.floating],
-    fs_hz: float,
-    config: PatternsConfig,
-) -> list[dict[str, Any]]:
+def kept(current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig) -> dict[str, Any]:
     """Return the spectrum of a segment's course; none if it is too short for any.
 
     A reported current keeps its sign: its size has a corner wherever it passes zero, which moves
     with friction and fills all bins (docs/decision.md has what each finds).
     """
     if not config.frames:
-        return []
+        return {}
     power = short_time_log_power(current, config.frames, config.bins)
     if not power.size:
-        return []
+        return {}
     frames, bins = power.shape
     bin_hz = fs_hz / (2 * current.size // (frames + 1))
-    shape = {"frames": frames, "bins": bins, "bin_hz": bin_hz}
-    return [{**{name: place[name] for name in PLACE}, **shape, "log_power": power.ravel()}]
+    return {"frames": frames, "bins": bins, "bin_hz": bin_hz, "log_power": power.ravel()}
 
 
 def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> SpectrumEvidence:

@@ -143,16 +143,12 @@ def find_recordings(
         [one for one in strays if only is None or one[0] in only],
         [one for one in unnamed if not Path(one[1]).is_relative_to(cell.out)],
     )
-    for log in logs:
-        if log.robot in result.by_robot:
-            result.by_robot[log.robot].append(reader.read(log))
-        else:
-            result.beside.setdefault(log.robot, []).extend(reader.known(log))
-    for log in fixed:
-        if log.robot in result.by_robot:
-            result.baseline_by_robot[log.robot].append(reader.read(log))
-        else:
-            result.beside.setdefault(log.robot, []).extend(reader.known(log))
+    for found, by_robot in ((logs, result.by_robot), (fixed, result.baseline_by_robot)):
+        for log in found:
+            if log.robot in by_robot:
+                by_robot[log.robot].append(reader.read(log))
+            else:
+                result.beside.setdefault(log.robot, []).extend(reader.known(log))
     reader.finish()
     for one in reader.gone({log.path for log in (*logs, *fixed)}):
         robot, path = one.log.robot, one.log.path
@@ -178,16 +174,20 @@ class _Reader:
 
     def known(self, log: LogFile) -> Iterator[Recording]:
         """Yield a recording as it is remembered, if it is that still."""
-        row = self._known.get(log.path)
-        if row is not None and (row.size, row.mtime_ns) == (log.size, log.mtime_ns):
+        if row := self._row(log):
             yield self._recording(log, row)
+
+    def _row(self, log: LogFile) -> FileRow | None:
+        row = self._known.get(log.path)
+        same = row is not None and (row.size, row.mtime_ns) == (log.size, log.mtime_ns)
+        return row if same else None
 
     def read(self, log: LogFile) -> Recording:
         if not _is_free(log.robot):
             taken = f"a robot cannot be called {log.robot}: so is a file of the results; rename it"
             return Recording(log, log.night or "", "", Facts(error=taken))
-        row = self._known.get(log.path)
-        if row is None or (row.size, row.mtime_ns) != (log.size, log.mtime_ns):
+        row = self._row(log)
+        if row is None:
             try:
                 sha256, facts = read_facts(log, fetch(log, self._copies))
             except InputError as error:

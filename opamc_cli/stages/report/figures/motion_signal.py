@@ -10,11 +10,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from opamc_cli.config.models import SegmentConfig
-from opamc_cli.signal.motion.motion_signal import MotionBand, motion_frames
+from opamc_cli.signal.motion.motion_signal import motion_frames
 from opamc_cli.signal.motion.noise import noise_level
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, temporal_fine_structure
-from opamc_cli.signal.transform.wavelet import Morse
-from opamc_cli.stages.chain.segments.carrier import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
+from opamc_cli.stages.chain.segments.carrier import frame_step, motion_band
 from opamc_cli.stages.processes.kept import remembered
 from opamc_cli.stages.report.figures.figure import (
     MAX_TRACE_POINTS,
@@ -140,16 +139,10 @@ def _draw_phases(panels: Any, cycle: _Cycle, run: Run, start: int, stop: int) ->
     vector = clarke(*(read[n] for n in names)) if len(names) == 3 else analytic_signal(current)
     vector = np.nan_to_num(vector)
     rate = run.sampling_rate_hz
-    band = MotionBand(
-        config.f_min_hz,
-        config.f_max_hz or min(HIGHEST_CARRIER_HZ, CARRIER_SHARE * rate),
-        config.voices_per_octave,
-        Morse(config.gamma, config.beta),
-    )
-    step = int(2 ** max(0, np.floor(np.log2(FRAME_S * rate))))
+    step = frame_step(rate)
     loudest_a = float(np.quantile(np.abs(vector), 0.95))
     tfs = temporal_fine_structure(vector, min(config.noise_floor * noise_level(vector), loudest_a))
-    frames = motion_frames(tfs, band, rate, step, config.engine)
+    frames = motion_frames(tfs, motion_band(rate, config), rate, step, config.engine)
     _trace(panels[0], current, start / rate, 1.0 / rate, "muted")
     panels[0].set_ylabel(cycle.quantity)
     _trace(panels[1], frames.strength, start / rate, step / rate, "baseline")

@@ -6,7 +6,6 @@ import numpy as np
 
 from opamc_cli.stages.report.figures.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
 from opamc_cli.stages.report.figures.palette import colour
-from opamc_cli.stages.report.figures.residual import loop_axis
 from opamc_cli.stages.report.results.columns import extremes, select
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
@@ -63,7 +62,7 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
 
 def _added_orders(inputs: ReportInputs, axis: int) -> list[float]:
     found = []
-    for step in loop_axis(inputs, axis).get("steps", ()):
+    for step in inputs.loop_axis(axis).get("steps", ()):
         value = (step.get("parameters") or {}).get("order")
         if isinstance(value, int | float) and math.isfinite(value):
             found.append(float(value))

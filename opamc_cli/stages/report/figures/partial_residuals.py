@@ -5,7 +5,6 @@ from typing import Any
 
 from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
 from opamc_cli.stages.report.figures.palette import colour
-from opamc_cli.stages.report.figures.residual import loop_axis
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 MOST = 6
@@ -15,7 +14,7 @@ COLUMNS = 2
 
 def figure(inputs: ReportInputs, axis: int) -> Figure:
     """Draw the partial residual of every effect that the loop added to one axis."""
-    added = loop_axis(inputs, axis).get("steps", ())
+    added = inputs.loop_axis(axis).get("steps", ())
     steps = [step for step in added if step.get("curve")]
     if not steps:
         nothing = f"the loop added nothing to axis {axis}"

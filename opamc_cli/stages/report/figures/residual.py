@@ -1,8 +1,5 @@
 """The model's residual before and after the loop: over time, angle and speed."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -118,11 +115,3 @@ def _over_quantity(panel: Axes, rows: Columns, column: str, label: str, unit: st
 def _rms(values: NDArray[np.float64]) -> float:
     finite = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
-
-
-def loop_axis(inputs: ReportInputs, axis: int) -> Mapping[str, Any]:
-    """Return what the loop says of an axis (empty if nothing)."""
-    for entry in (inputs.loop or {}).get("axes", ()):
-        if entry.get("axis") == axis:
-            return dict(entry)
-    return {}

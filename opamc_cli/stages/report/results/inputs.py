@@ -128,15 +128,21 @@ class ReportInputs:
 
     def axis_verdict(self, axis: int) -> Mapping[str, Any] | None:
         """Return what the verdict says of an axis, if anything."""
-        for entry in (self.verdict or {}).get("axes", ()):
-            if entry.get("axis") == axis:
-                return dict(entry)
-        return None
+        return _of_axis(self.verdict, axis)
+
+    def loop_axis(self, axis: int) -> Mapping[str, Any]:
+        """Return what the loop says of an axis; empty if nothing."""
+        return _of_axis(self.loop, axis) or {}
 
     def state(self, axis: int) -> str | None:
         """Return the state of an axis, if the verdict names one."""
         entry = self.axis_verdict(axis)
         return None if entry is None else str(entry.get("state"))
+
+
+def _of_axis(document: Mapping[str, Any] | None, axis: int) -> Mapping[str, Any] | None:
+    entries = (document or {}).get("axes", ())
+    return next((entry for entry in entries if entry.get("axis") == axis), None)
 
 
 def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInputs:

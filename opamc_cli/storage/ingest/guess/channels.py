@@ -35,10 +35,9 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
                 place = channel.pattern if channel.number is not None else _parent(channel)
                 groups.setdefault(place, []).append(channel)
         families[kind] = sorted(groups.values(), key=_worth, reverse=True)
-    for stands, kind in (("torque", "current"),):
-        measured = [group for group in families[kind] if group[0].measured]
-        if not measured and not any(families[phase] for phase in PHASES):
-            families[kind] = families[stands]
+    measured = any(group[0].measured for group in families["current"])
+    if not measured and not any(families[phase] for phase in PHASES):
+        families["current"] = families["torque"]
     lowest = _first(families)
     choices = {}
     for kind in KINDS:

@@ -1,7 +1,7 @@
 """How a text table is laid out: separator, decimal mark, header, encoding."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -44,26 +44,17 @@ def text_layout(path: Path, encoding: str | None = None) -> Layout:
     """
     text, encoding = _top(path, encoding)
     lines = text.splitlines()
-    best: tuple[float, Layout] | None = None
-    for separator in SEPARATORS:
-        for decimal in (".", ","):
-            if decimal == separator:
-                continue
-            found = _layout([_cells(line, separator) for line in lines], separator, decimal)
-            if found is not None and (best is None or found[0] > best[0]):
-                best = found
+    found = [
+        _layout([_cells(line, separator) for line in lines], separator, decimal)
+        for separator in SEPARATORS
+        for decimal in (".", ",")
+        if decimal != separator
+    ]
+    best = max(filter(None, found), key=lambda one: one[0], default=None)
     if best is None:
         msg = f"{path}: no rows of numbers are found in it; write the map by hand"
         raise InputError(msg)
-    layout = best[1]
-    return Layout(
-        layout.separator,
-        layout.decimal,
-        layout.header,
-        layout.skip_rows,
-        layout.units_rows,
-        encoding,
-    )
+    return replace(best[1], encoding=encoding)
 
 
 def _top(path: Path, encoding: str | None) -> tuple[str, str]:

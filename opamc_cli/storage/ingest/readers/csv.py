@@ -46,6 +46,7 @@ class CsvSource:
     def __init__(self, path: Path, channels: IngestMap) -> None:
         self.path = path
         self._map = channels
+        self._encoding = "utf-8" if _is_utf8(channels.encoding) else channels.encoding
         self._no_number = [*pacsv.ConvertOptions().null_values, *channels.missing]
         self._dates: set[int] = set()
         self.remarks: list[str] = []
@@ -154,7 +155,7 @@ class CsvSource:
         return header, units, first
 
     def _text(self) -> io.TextIOWrapper:
-        encoding = "utf-8-sig" if _is_utf8(self._map.encoding) else self._map.encoding
+        encoding = "utf-8-sig" if self._encoding == "utf-8" else self._encoding
         # universal newlines: csv.reader alone would refuse files that end lines by CR
         return io.TextIOWrapper(self._bytes(), encoding=encoding, newline=None)
 
@@ -174,7 +175,7 @@ class CsvSource:
                     column_names=names,
                     skip_rows=self._skipped,
                     block_size=BLOCK_BYTES,
-                    encoding="utf8" if _is_utf8(self._map.encoding) else self._map.encoding,
+                    encoding=self._encoding,
                     use_threads=False,
                 ),
                 parse_options=pacsv.ParseOptions(
@@ -201,8 +202,7 @@ class CsvSource:
         with self._bytes() as stream:
             while part := stream.read(BLOCK_BYTES):
                 last = (last + part)[-MOST_LINE:]
-        encoding = "utf-8" if _is_utf8(self._map.encoding) else self._map.encoding
-        ends = last.endswith(row.text.encode(encoding)) and not last.endswith((b"\n", b"\r"))
+        ends = last.endswith(row.text.encode(self._encoding)) and not last.endswith((b"\n", b"\r"))
         self.remarks = [f"{self.path}: its last line is cut off and left out"] if ends else []
         return "skip" if ends else "error"
 
