@@ -142,7 +142,7 @@ def temperatures(columns):
 @pytest.mark.parametrize(
     ("wrong", "usual", "said"),
     [
-        (one_infinite, lambda _: None, "1 sample of axis 2 is no number"),
+        (one_infinite, lambda _: None, "1 sample of axis 2 is lost (no number"),
         (torn, temperatures, "the temperature of axis 2 has moved by -75 °C, the others by +0"),
     ],
 )

@@ -41,7 +41,7 @@ class SegmentOutcome:
     errors: tuple[OpamcError, ...]
     """One for each run, or axis of a run, that could not be used."""
     missing: Mapping[tuple[str, int], int] = field(default_factory=dict)
-    """Samples of a current, position or speed that are no numbers, by run and axis."""
+    """Samples of a current, position or speed that are lost, by run and axis."""
 
     def by_axis(self) -> list[dict[str, Any]]:
         """Return segments, time in motion and largest frequency by run, axis and kind."""

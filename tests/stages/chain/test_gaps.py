@@ -7,7 +7,7 @@ from carriers import Move, record
 
 from opamc_cli.config import load_config
 from opamc_cli.stages.chain import segment
-from opamc_cli.stages.chain.segments.rows import Gaps
+from opamc_cli.stages.chain.segments.rows import Flags
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
@@ -46,38 +46,78 @@ def test_what_a_gap_cuts_is_in_no_cycle_and_none_reaches_across(tmp_path, cycles
     assert list(members.values()) == [[(m, first + m) for m in range(4)] for first in whole]
 
 
-@pytest.mark.parametrize(
-    ("channel", "first", "n", "cut"),
-    [
-        ("position", 930, 60, (2,)),  # spans a start
-        ("position", 1190, 180, (2, 3)),  # spans a rest
-        ("current", 1070, 60, (2,)),  # amid a motion
-        ("current", 850, 60, ()),  # at rest
-    ],
-)
-def test_so_does_a_gap_in_what_tells_the_motion(tmp_path, channel, first, n, cut):
+def reciprocating():
+    """Motions of one second, from samples 150, 550, 950 and so on: position and current."""
     stroke = 0.5 - 0.5 * np.cos(np.pi * np.arange(250) / 250)
     there = [np.zeros(150), stroke, np.ones(150), 1 - stroke]
     position = np.concatenate([*there * 4, np.zeros(150)])
     speed = np.gradient(position) * 250
     rng = np.random.default_rng(4)
-    current = np.tanh(speed / 0.02) + 0.5 * speed + 0.01 * rng.normal(size=speed.size)
+    return position, np.tanh(speed / 0.02) + 0.5 * speed + 0.01 * rng.normal(size=speed.size)
+
+
+def cut_motions(tmp_path, position, current):
     values = {"axis1_current": current, "axis1_position": position}
-    values[f"axis1_{channel}"][first : first + n] = np.nan
     save_run(tmp_path / "run.parquet", RunInfo(sampling_rate_hz=250.0), values)
     outcome = segment.run([tmp_path / "run.parquet"], load_config(), tmp_path / "out")
     edges = outcome.table["edge"].to_pylist()
-    assert [i for i, edge in enumerate(edges) if edge] == list(cut)
-    assert outcome.missing == {("run", 1): n}
+    return [i for i, edge in enumerate(edges) if edge], outcome.missing["run", 1]
 
 
-def test_gaps_are_told_across_blocks():
-    known = np.random.default_rng(3).random(1000) < 0.6
-    gaps = Gaps()
-    for block in np.split(known, [1, 4, 300, 301, 777]):
-        gaps.push(block)
-    told = np.ones(known.size, dtype=bool)
-    for first, last in gaps.spans():
-        assert not known[first:last].any()
-        told[first:last] = False
-    np.testing.assert_array_equal(told, known)
+@pytest.mark.parametrize(
+    ("channel", "first", "n", "cut"),
+    [
+        (0, 930, 60, [2]),  # of the position, spans a start
+        (0, 1190, 180, [2, 3]),  # spans a rest
+        (1, 1070, 60, [2]),  # of the current, amid a motion
+        (1, 850, 60, []),  # at rest
+    ],
+)
+def test_so_does_a_gap_in_what_tells_the_motion(tmp_path, channel, first, n, cut):
+    channels = reciprocating()
+    channels[channel][first : first + n] = np.nan
+    assert cut_motions(tmp_path, *channels) == (cut, n)
+
+
+@pytest.mark.parametrize(("n", "cut"), [(21, [2]), (20, [])])
+def test_a_current_that_a_logger_keeps_is_lost_too(tmp_path, n, cut):
+    position, current = reciprocating()
+    current[1070 : 1070 + n] = current[1070]
+    assert cut_motions(tmp_path, position, current) == (cut, n - 1 if cut else 0)
+
+
+def test_no_logger_keeps_a_current_that_is_at_its_limit_at_nothing_or_in_coarse_steps(tmp_path):
+    position, current = reciprocating()
+    limited = np.clip(current, -1.2, 1.2)
+    assert cut_motions(tmp_path, position, limited) == ([], 0)
+    without = np.where(np.abs(current) < 1.0, 0.0, current)
+    assert cut_motions(tmp_path, position, without) == ([], 0)
+    assert cut_motions(tmp_path, position, np.round(current, 1)) == ([], 0)
+
+
+def test_phases_that_a_logger_keeps_are_lost(tmp_path):
+    made = record(MOVES, noise=0.02, seed=3)
+    phases = made.phases.copy()
+    at = sum(made.intervals[1]) // 2
+    phases[:, at : at + 300] = phases[:, [at]]
+    values = {f"axis1_{name}": x for name, x in zip("abc", phases, strict=True)}
+    save_run(tmp_path / "run.parquet", RunInfo(sampling_rate_hz=RATE_HZ), values)
+    outcome = segment.run([tmp_path / "run.parquet"], load_config(), tmp_path / "out")
+    cut = [row for row in outcome.table.to_pylist() if row["edge"]]
+    assert min(row["start"] for row in cut) < at < max(row["stop"] for row in cut)
+    first, last = made.intervals[1]
+    assert all(first - 60 < row["start"] < row["stop"] < last + 60 for row in cut)
+    assert outcome.missing == {("run", 1): 299}
+
+
+def test_stretches_are_told_across_blocks():
+    so = np.random.default_rng(3).random(1000) < 0.4
+    flags = Flags()
+    for block in np.split(so, [1, 4, 300, 301, 777]):
+        flags.push(block)
+    told = np.zeros(so.size, dtype=bool)
+    for first, last in flags.spans():
+        told[first:last] = True
+    np.testing.assert_array_equal(told, so)
+    assert flags.share == np.mean(so)
+    assert flags.spans(4) == [(a, b) for a, b in flags.spans() if b - a >= 4]

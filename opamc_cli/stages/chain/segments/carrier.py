@@ -1,5 +1,6 @@
 """Segments of an axis with phase currents: by the motion signal of its carrier."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -32,9 +33,10 @@ from opamc_cli.signal.transform.wavelet import Morse
 from opamc_cli.stages.chain.segments.rows import (
     STILL_SHARE,
     AxisSegments,
-    Gaps,
+    Flags,
     Segment,
     lost,
+    lost_spans,
     make_rows,
     mean_variance,
     read_variance,
@@ -173,7 +175,8 @@ def _gather(
     hilbert = AnalyticStream(fs_hz, band.f_min_hz) if len(names) == 1 else None
     frames, turns = [], []
     n_missing = dict.fromkeys(names, 0)
-    gaps = Gaps()
+    unknown, held = Flags(), Flags()
+    last = dict.fromkeys(names, math.nan)
     lowest = dict.fromkeys(names, np.inf)
     highest = dict.fromkeys(names, -np.inf)
     sizes = {name: Size(LIMITS["A"]) for name in names}
@@ -185,8 +188,12 @@ def _gather(
     for _, block in run.blocks(names):
         phases = []
         whole = np.ones(block[names[0]].size, dtype=bool)
+        same = whole.copy()
         for name in names:
             x = block[name].astype(np.float32, copy=False)
+            same[0] &= bool(x[0] == last[name])
+            same[1:] &= x[1:] == x[:-1]
+            last[name] = float(x[-1])
             low, high = float(x.min()), float(x.max())
             if not np.isfinite(low + high):
                 known = np.isfinite(x)
@@ -199,7 +206,8 @@ def _gather(
             sizes[name].add(x)
             lowest[name], highest[name] = min(lowest[name], low), max(highest[name], high)
             phases.append(x)
-        gaps.push(whole)
+        unknown.push(~whole)
+        held.push(same)
         if hilbert is None:
             take(clarke(*phases) - np.complex64(probe.offset_a))
         else:
@@ -227,7 +235,8 @@ def _gather(
         noise_a=probe.noise_a,
         f_floor_hz=band.f_min_hz,
     )
-    return evidence, notes, max(n_missing.values()), gaps.spans()
+    gaps = lost_spans(unknown, held, fs_hz)
+    return evidence, notes, max(*n_missing.values(), sum(b - a for a, b in gaps)), gaps
 
 
 def _current(phases: Sequence[Floats]) -> npt.NDArray[np.inexact]:

@@ -19,9 +19,10 @@ from opamc_cli.signal.plausible.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
     STILL_SHARE,
     AxisSegments,
-    Gaps,
+    Flags,
     Segment,
     lost,
+    lost_spans,
     make_rows,
     mean_variance,
 )
@@ -59,8 +60,12 @@ def joint_segments(
         logged = np.isfinite(run.read([column])[column])
         if np.mean(logged) > SLOWER:
             whole &= logged
-    gaps = Gaps()
-    gaps.push(whole)
+    unknown, held = Flags(), Flags()
+    unknown.push(~whole)
+    # at its limit, or at 0, a current is held by no logger
+    odd = (current != 0) & (current != np.nanmax(current)) & (current != np.nanmin(current))
+    held.push((np.diff(current, prepend=np.nan) == 0) & odd)
+    gaps = lost_spans(unknown, held, run.sampling_rate_hz)
     known = current[np.isfinite(current)]
     if not known.size:
         msg = (
@@ -113,12 +118,12 @@ def joint_segments(
     shortest_s = max(config.min_motion_s, FEWEST_SAMPLES / run.sampling_rate_hz)
     return AxisSegments(
         run.name,
-        make_rows(run, channels, segments, "reported", gaps.spans()),
+        make_rows(run, channels, segments, "reported", gaps),
         tuple(notes),
         f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
         f"{config.min_speed_rad_s:g} is motion where it lasts for {shortest_s:.2g} s",
         lost(channels.axis, 1 - known.size / current.size),
-        int(whole.size - whole.sum()),
+        max(int(whole.size - whole.sum()), sum(b - a for a, b in gaps)),
     )
 
 

@@ -31,6 +31,10 @@ class Segment:
     kind: str = "motion"
 
 
+FEWEST_HELD, RARELY = 20, 0.1
+"""Equal samples in a row that are held, and the share of samples like the one before them up to
+which they are: by chance twenty in a row are 1e-20."""
+
 MOST_MISSING = 0.1
 """Share of an axis's samples without a number that is a note; of more it is said that they lack."""
 
@@ -49,7 +53,7 @@ class AxisSegments(NamedTuple):
     lost: str | None = None
     """One sentence if so many samples are no numbers that motions are likely among them."""
     n_missing: int = 0
-    """Samples at which its current, or what tells its motion, is no number."""
+    """Samples at which its current, or what tells its motion, is no number or was not renewed."""
 
 
 def lost(axis: int, share: float) -> str | None:
@@ -62,24 +66,39 @@ def lost(axis: int, share: float) -> str | None:
     )
 
 
-class Gaps:
-    """Where channels have no numbers, gathered block by block."""
+class Flags:
+    """Where something is so, gathered block by block."""
 
     def __init__(self) -> None:
         self._flips: list[int] = []
-        self._known = True
+        self._is_so = False
         self._n = 0
 
-    def push(self, known: npt.NDArray[np.bool_]) -> None:
-        """Take which samples of the next block are numbers."""
-        flips = np.flatnonzero(np.diff(known, prepend=self._known))
+    def push(self, is_so: npt.NDArray[np.bool_]) -> None:
+        """Take the samples of the next block."""
+        flips = np.flatnonzero(np.diff(is_so, prepend=self._is_so))
         self._flips += (flips + self._n).tolist()
-        self._known, self._n = bool(known[-1]), self._n + known.size
+        self._is_so, self._n = bool(is_so[-1]), self._n + is_so.size
 
-    def spans(self) -> list[tuple[int, int]]:
-        """Return the first sample of each gap, and the one behind its last."""
-        ends = self._flips if self._known else [*self._flips, self._n]
-        return list(zip(ends[::2], ends[1::2], strict=True))
+    def spans(self, least: float = 1) -> list[tuple[int, int]]:
+        """Return the first sample of each stretch that lasts as long, and the one behind it."""
+        ends = [*self._flips, self._n] if self._is_so else self._flips
+        return [(a, b) for a, b in zip(ends[::2], ends[1::2], strict=True) if b - a >= least]
+
+    @property
+    def share(self) -> float:
+        """Share of the samples at which it is so."""
+        return sum(b - a for a, b in self.spans()) / max(self._n, 1)
+
+
+def lost_spans(unknown: Flags, held: Flags, rate_hz: float) -> list[tuple[int, int]]:
+    """Return where channels are lost for a while: no numbers, or the last one kept.
+
+    Values are kept by a logger that waits for its bus, if they change with nearly each sample else.
+    """
+    least = EDGE_S * rate_hz
+    kept = held.spans(max(least, FEWEST_HELD)) if held.share < RARELY else []
+    return unknown.spans(least) + kept
 
 
 def make_rows(
@@ -91,7 +110,7 @@ def make_rows(
 ) -> tuple[dict[str, Any], ...]:
     """Complete segments to rows: temperature, edges, and what they have in common."""
     margin = EDGE_S * run.sampling_rate_hz
-    beyond = [(0, 0), *((a, b) for a, b in gaps if b - a >= margin), (run.n_samples, run.n_samples)]
+    beyond = [(0, 0), *gaps, (run.n_samples, run.n_samples)]
     return tuple(
         {
             "run": run.name,

@@ -45,7 +45,7 @@ class Side:
     two_speeds: Collection[str] = ()
     """Runs of which some cycles are left out, as is said: they are of another speed."""
     missing: Mapping[tuple[str, int], int] = field(default_factory=dict)
-    """Samples of a current, position or speed that are no numbers, by run and axis."""
+    """Samples of a current, position or speed that are lost, by run and axis."""
 
     def moving_axes(self) -> set[int]:
         """Return the axes that move in any run, whether they are compared or not."""

@@ -95,17 +95,17 @@ def with_gaps(baseline: Side, target: Side) -> list[InputError]:
     paths = {own.run: own.path for own in target.measured}
     return [
         InputError(
-            f"{paths[run]}: {_no_numbers(max(lacking.values()), sorted(lacking))}, in the "
-            f"baseline's recordings {max(usual[axis] for axis in lacking)} at most; what that "
-            "touches is not judged: check sensor, cable and log",
+            f"{paths[run]}: {_lost(max(lacking.values()), sorted(lacking))} (no number, or the "
+            f"last one kept), in the baseline's recordings {max(usual[axis] for axis in lacking)} "
+            "at most; what that touches is not judged: check sensor, cable and log",
             axes=lacking,
         )
         for run, lacking in found.items()
     ]
 
 
-def _no_numbers(count: int, axes: Sequence[int]) -> str:
-    are = "samples of {} are no numbers" if count > 1 else "sample of {} is no number"
+def _lost(count: int, axes: Sequence[int]) -> str:
+    are = "samples of {} are lost" if count > 1 else "sample of {} is lost"
     return f"{count} {are.format(axes_phrase(axes))}"
 
 
