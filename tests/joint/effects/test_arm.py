@@ -1,0 +1,148 @@
+"""configs/arm.py: an arm's links by the laws of mechanics, and what is left beside them."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from opamc_cli.__main__ import main
+
+ARM = Path(__file__).parents[3] / "configs" / "arm.py"
+
+
+@pytest.fixture
+def arm():
+    spec = importlib.util.spec_from_file_location("arm", ARM)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def links(seed):
+    """Inertial parameters of six solid links: a sum of point masses each; (6, 10)."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for mass in (7.8, 12.9, 3.9, 2.0, 2.0, 1.5):
+        points, share = rng.normal(0, 0.15, (8, 3)), mass / 8
+        inertia = share * sum(p @ p * np.eye(3) - np.outer(p, p) for p in points)
+        found.append([mass, *(share * points.sum(0)), *inertia[np.triu_indices(3)]])
+    return np.array(found)
+
+
+def asked(arm, motion, parameters):
+    """Torques of all joints; (6, n)."""
+    each = [arm.torques(motion, joint) @ parameters[joint:].ravel() for joint in range(6)]
+    return np.array(each)
+
+
+def test_two_links_on_parallel_axes_are_the_planar_elbow(arm):
+    # Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, 2006, section 7.3; y is up.
+    arm.UP = (0.0, 1.0, 0.0)
+    arm.JOINTS = tuple(((x, 0.0, 0.0), (0.0, 0.0, 0.0), (0, 0, 1)) for x in (0.0, 0.7))
+    motion = np.random.default_rng(0).uniform(-2, 2, (3, 2, 50))
+    (q1, q2), (v1, v2), (a1, a2) = motion
+    m1, m2, c1, c2, i1, i2, l1, g = 3.0, 2.0, 0.3, 0.4, 0.2, 0.1, 0.7, 9.81
+    b, s = m2 * l1 * c2 * np.cos(q2), m2 * l1 * c2 * np.sin(q2)
+    far = m2 * c2**2 + i2
+    upper = (m1 * c1**2 + i1 + m2 * l1**2 + far + 2 * b) * a1 + (far + b) * a2
+    upper += -s * v2**2 - 2 * s * v1 * v2 + (m1 * c1 + m2 * l1) * g * np.cos(q1)
+    upper += m2 * c2 * g * np.cos(q1 + q2)
+    lower = (far + b) * a1 + far * a2 + s * v1**2 + m2 * c2 * g * np.cos(q1 + q2)
+    first = np.array([m1, m1 * c1, 0, 0, 0, 0, 0, 0, 0, m1 * c1**2 + i1])
+    second = np.array([m2, m2 * c2, 0, 0, 0, 0, 0, 0, 0, far])
+    assert np.allclose(arm.torques(motion, 0) @ np.r_[first, second], upper)
+    assert np.allclose(arm.torques(motion, 1) @ second, lower)
+
+
+def test_an_arm_keeps_its_energy_and_its_weight_has_a_potential(arm):
+    own, rng = links(1), np.random.default_rng(2)
+    q, v = rng.uniform(-2, 2, (2, 6))
+    still, unit, step = np.zeros(6), np.eye(6), 1e-5
+
+    def torque(q, v, a):
+        return asked(arm, np.array([q, v, a])[:, :, None], own)[:, 0]
+
+    def inertia(q):
+        return np.array([torque(q, still, one) - torque(q, still, still) for one in unit])
+
+    def weight(q):
+        return torque(q, still, still)
+
+    assert np.allclose(inertia(q), inertia(q).T)
+    assert np.linalg.eigvalsh(inertia(q)).min() > 0
+    slopes = np.array([(weight(q + step * e) - weight(q - step * e)) / (2 * step) for e in unit])
+    assert np.allclose(slopes, slopes.T, atol=1e-6)
+    assert np.abs(slopes).max() > 1
+    # What speeds alone ask changes the kinetic energy by as much as the pose changes the inertia.
+    turning = torque(q, v, still) - weight(q)
+    changing = (inertia(q + step * v) - inertia(q - step * v)) / (2 * step)
+    assert np.isclose(v @ turning, 0.5 * v @ changing @ v, rtol=1e-6)
+
+
+def recorded(arm, folder, lacks, axes=range(1, 7)):
+    """40 s of random motions of all axes, the current of axis 4 with one thing more."""
+    rate, rng, noise = 200.0, np.random.default_rng(3), 0.02
+    t = np.arange(int(40 * rate)) / rate
+    waves = rng.uniform(0.2, 3.0, (6, 5)), rng.uniform(0, 6, (6, 5)), rng.uniform(0.1, 0.4, (6, 5))
+    speed, phase, size = (one[:, :, None] for one in waves)
+    q = (size * np.sin(speed * t + phase)).sum(1)
+    v = (size * speed * np.cos(speed * t + phase)).sum(1)
+    a = -(size * speed**2 * np.sin(speed * t + phase)).sum(1)
+    own, motion = links(4), np.array([q, v, a])
+    current = asked(arm, motion, own)[3] / 5
+    current += 0.3 * a[3] + 0.4 * np.sign(v[3]) + 0.1 * v[3] + noise * rng.normal(size=t.size)
+    if lacks == "payload_change":
+        # A kilogram, a tenth of a metre before the flange.
+        held = np.array([1.0, 0.0, 0.1, 0.0, *(0.01, 0.0, 0.0, 0.0, 0.0, 0.01)])
+        current += (t > 21) * (arm.torques(motion, 3)[:, -10:] @ held) / 5
+    else:
+        current += 0.2 / np.mean(v[3] ** 2) * v[3] * np.abs(v[3])
+    columns = {f"axis{axis}_position": q[axis - 1] for axis in axes}
+    table = pa.table({"axis4_current": current, **columns})
+    record = json.dumps({"sampling_rate_hz": rate}).encode()
+    pq.write_table(table.replace_schema_metadata({b"opamc": record}), folder / "run.parquet")
+    (folder / "arm.py").write_text(ARM.read_text())
+    (folder / "model.yaml").write_text(
+        "library: [arm.py]\neffects: [arm, inertia, offset, coulomb, viscous]\n"
+        "without: [coupling]\n"
+    )
+    return noise
+
+
+def close(folder):
+    run, model, out = (str(folder / name) for name in ("run.parquet", "model.yaml", "out"))
+    words = ("--model", model, "--axis", "4", "--out", out, "--jobs", "1")
+    return ended("model", "close", run, *words)
+
+
+def ended(*words):
+    with pytest.raises(SystemExit) as stopped:
+        main([*words])
+    return int(stopped.value.code or 0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lacks", ["quadratic_friction", "payload_change"])
+def test_beside_a_declared_arm_what_its_joint_lacks_is_named(arm, tmp_path, lacks):
+    noise = recorded(arm, tmp_path, lacks)
+    assert close(tmp_path) == 0
+    (loop,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert [step["effect"] for step in loop["steps"]] == [lacks]
+    assert loop["verdict"] == "closed"
+    assert loop["after"]["rmse_a"] < 1.1 * noise
+    if lacks != "payload_change":  # which other recordings need not carry
+        applied = ("evaluate", str(tmp_path / "run.parquet"), "--axis", "4", "--quiet")
+        closed = ("--model", str(tmp_path / "out" / "model.yaml"), "--out", str(tmp_path / "on"))
+        assert ended("model", *applied, *closed) == 0
+        (one,) = json.loads((tmp_path / "on" / "evaluation.json").read_text())["axes"]
+        assert one["rmse_a"] < 1.1 * noise
+
+
+def test_an_arm_asks_for_all_of_its_axes(arm, tmp_path, capsys):
+    recorded(arm, tmp_path, "", axes=range(1, 6))
+    assert close(tmp_path) == 2
+    assert "those of axes 1, 2, 3, 5: log all" in capsys.readouterr().err
