@@ -263,9 +263,9 @@ def _next(
         return left - float(np.mean(left_by(compared, population, shift)[late]))
 
     gains = {name: gain(shift) for name, (_, shift) in sure.items()}
-    # What friction of both kinds, or another payload, explains as well is no scale, or ties with it
-    # if it is not sure by itself; nor is what both together, which may happen to one joint at
-    # another temperature, explain better.
+    # What friction of both kinds, or another payload, explains as well is no scale; nor is what
+    # both together, which may happen to one joint at another temperature, explain better. Where
+    # nothing else is sure by itself it ties with friction.
     scale, rubs = gains.pop(SCALE.name, 0.0), ("coulomb", "viscous")
     both = [term for term in candidates if term.effect.name in rubs]
     loads = [term for term in candidates if term.effect.name == "payload_change"]
@@ -276,9 +276,8 @@ def _next(
             for first in ((), loads)
             for one in shifts(compared, population, (*chosen, *first, both[0]), both[1:])
         )
-        clear = NEARLY_AS_GOOD * scale > max([*gains.values(), alone])
-        tied = not gains and scale > NEARLY_AS_GOOD * alone
-        if (clear or tied) and scale > AS_GOOD * beside:
+        clear = NEARLY_AS_GOOD * scale > max([*gains.values(), alone]) and scale > AS_GOOD * beside
+        if clear or (not gains and scale > NEARLY_AS_GOOD * alone):
             gains, alike = {SCALE.name: scale}, () if clear else rubs
     if not gains:
         return None

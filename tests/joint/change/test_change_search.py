@@ -79,6 +79,22 @@ def test_all_of_the_current_in_one_proportion_is_no_payload():
     assert causes_of(lambda *at: payload(*at) + 0.5 * thick(*at))[0].effect != "current_scale"
 
 
+def test_a_scale_that_is_sure_while_friction_is_not_is_named_in_a_tie(monkeypatch):
+    likeliest = search._likeliest
+
+    def unsure(*given):
+        best = likeliest(*given)
+        return {name: (p if name == "current_scale" else 1.0, s) for name, (p, s) in best.items()}
+
+    monkeypatch.setattr(search, "_likeliest", unsure)
+    (cause,) = causes_of(scaled)
+    assert (cause.effect, cause.ties) == ("current_scale", ())
+    # what friction of both kinds explains much better is none
+    assert causes_of(heavy) == []
+    monkeypatch.setattr(search, "NEARLY_AS_GOOD", 0.0)
+    assert causes_of(scaled)[0].ties == ("coulomb", "viscous")
+
+
 def test_what_no_model_holds_has_no_slow_cause():
     """Noise in a current's place was magnets that had lost 102 %, or friction that had lost 97."""
     rng = np.random.default_rng(0)
