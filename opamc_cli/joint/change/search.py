@@ -265,7 +265,7 @@ def _next(
     gains = {name: gain(shift) for name, (_, shift) in sure.items()}
     # What friction of both kinds, or another payload, explains as well is no scale; nor is what
     # both together, which may happen to one joint at another temperature, explain better. Where
-    # nothing else is sure by itself it ties with friction.
+    # nothing else is sure by itself it is named, if in a tie with friction.
     scale, rubs = gains.pop(SCALE.name, 0.0), ("coulomb", "viscous")
     both = [term for term in candidates if term.effect.name in rubs]
     loads = [term for term in candidates if term.effect.name == "payload_change"]
@@ -278,7 +278,8 @@ def _next(
         )
         clear = NEARLY_AS_GOOD * scale > max([*gains.values(), alone]) and scale > AS_GOOD * beside
         if clear or (not gains and scale > NEARLY_AS_GOOD * alone):
-            gains, alike = {SCALE.name: scale}, () if clear else rubs
+            gains = {SCALE.name: scale}
+            alike = rubs if alone >= NEARLY_AS_GOOD * scale else ()
     if not gains:
         return None
     most = max(gains.values())
