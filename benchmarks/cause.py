@@ -4,9 +4,9 @@
     python benchmarks/cause.py --seeds 30 --write   # and docs/validation.md
 
 Every pair holds six baseline and two target sessions of one joint; what changed between them is
-known. Half of the pairs are the virtual robot's (axis and speed follow from the seed), half the
-tests' own simulator's. Tuning used seeds below 100; 14000 to 14029 were begun and
-showed a mistake in the shares, so the default begins after them.
+known; the plain rival is asked of the same. Half of the pairs are the virtual robot's (axis and
+speed follow from the seed), half the tests' own simulator's. Tuning used seeds below 100; 14000 to
+14029 were begun and showed a mistake in the shares, so the default begins after them.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from change_pairs import JOINT_CHANGES, ROBOT_CHANGES, Pair, joint_pair, robot_pair
+from plain_cause import Plain, plain_cause
 
 from opamc_cli.joint.change.explain import FAULT_SHARE, Change, explain_change
 
@@ -47,20 +48,16 @@ class Outcome:
     harmless: bool
     wrong_fault: bool
     share: float
+    plain: bool
+    """Whether the plain rival was right."""
 
 
-def judged(pair: Pair, change: Change) -> Outcome:
+def judged(pair: Pair, change: Change, rival: Plain) -> Outcome:
     """Hold what was said against what was true."""
     expected = EXPECTED[pair.name]
     first = change.causes[0] if change.causes else None
-    right = expected is None and first is None
-    if first is not None and expected is not None:
-        right = expected in (first.effect, *first.ties)
-        if pair.name.startswith(("flexspline", "tooth")):
-            said = " ".join((first.interpretation, *first.ties))
-            right = right and "flexspline" in said
-        elif pair.name == "ripple":
-            right = right and "flexspline" not in first.interpretation
+    said = (None, "", ()) if first is None else (first.effect, first.interpretation, first.ties)
+    right = _right(pair.name, *said)
     wrong = any(
         not cause.harmless
         and cause.share >= FAULT_SHARE
@@ -73,7 +70,19 @@ def judged(pair: Pair, change: Change) -> Outcome:
         harmless=change.harmless,
         wrong_fault=wrong and not change.harmless,
         share=first.share if first is not None and right else float("nan"),
+        plain=_right(pair.name, rival.effect, rival.text, rival.ties),
     )
+
+
+def _right(name: str, effect: str | None, text: str, ties: tuple[str, ...]) -> bool:
+    """Whether an effect is the true one, or ties with it, and a ripple is the right one's."""
+    expected = EXPECTED[name]
+    if effect is None or expected is None:
+        return effect is expected
+    right = expected in (effect, *ties)
+    if name.startswith(("flexspline", "tooth")):
+        return right and "flexspline" in " ".join((text, *ties))
+    return right and not (name == "ripple" and "flexspline" in text)
 
 
 def main() -> None:
@@ -91,8 +100,8 @@ def main() -> None:
     seeds = range(arguments.first_seed, arguments.first_seed + count)
     lines = [
         "| source | change | named | right, or a tie that holds it | said to be harmless "
-        "| wrong fault | share of the change |",
-        "|---|---|---|---|---|---|---|",
+        "| wrong fault | share of the change | plain right |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     print("\n".join(lines))
     spent: list[float] = []
@@ -108,7 +117,8 @@ def main() -> None:
                     start = time.perf_counter()
                     change = explain_change(pair.baseline, pair.target, pair.joint)
                     spent.append(time.perf_counter() - start)
-                    outcome = judged(pair, change)
+                    rival = plain_cause(pair.baseline, pair.target, pair.joint)
+                    outcome = judged(pair, change, rival)
                     outcomes[mode].append(outcome)
                     if arguments.verbose and (not outcome.right or outcome.wrong_fault):
                         said = [
@@ -157,6 +167,8 @@ def _row(source: str, name: str, logged: list[list[Outcome]]) -> str:
     ]
     shares = [[each.share for each in outcomes if np.isfinite(each.share)] for outcomes in logged]
     cells.append(", ".join(f"{np.median(each):.0%}" if each else "–" for each in shares))
+    plain = ", ".join(str(sum(each.plain for each in outcomes)) for outcomes in logged)
+    cells.append(f"{plain} of {len(logged[0])}")
     return f"| {source} | {name} | {' | '.join(cells)} |"
 
 

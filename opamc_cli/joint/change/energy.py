@@ -7,40 +7,10 @@ from opamc_cli.joint.change.slow import Population, Shift, shift_current
 from opamc_cli.joint.change.units import Compared, own_fit
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import highest_order
-from opamc_cli.signal.transform.least_squares import solve
 
 MOST_HARMONICS = 4
 KNOTS = 6
 """A ripple's size and phase follow speed and load along a stroke: this many values of each."""
-
-CLEAR = 2.5
-"""Baseline standard deviations by which a mean square must differ to count as changed."""
-
-
-def energy_of(
-    compared: Compared, population: Population, shift: Shift | None = None
-) -> tuple[float, float]:
-    """Change of the mean square residual, after a shift, if given, is taken from the target.
-
-    First in the declared effects' coefficients (what the baseline's mean model leaves more in the
-    target than a unit's own fit, less the same in the baseline), then in the residual of every
-    unit's own fit; both in A^2.
-    """
-    after = compared.after
-    sums = compared.sums(population.terms, True, shift_current(compared, shift))
-    counts = sums.parts.counts
-    left = sums.left(solve(sums.gram, sums.moment)) / counts
-    mean = np.zeros(sums.moment.shape[1])
-    mean[: population.mean.size] = population.mean
-    moved = np.maximum(sums.left(mean) / counts - left, 0.0)
-    n = int(np.count_nonzero(~after))
-    # A baseline unit is a part of the mean that it is compared with.
-    fair = (n + 1) / max(n - 1, 1)
-    slow = float(np.mean(moved[after]) - fair * np.mean(moved[~after]))
-    spread = max(float(np.std(left[~after], ddof=1)), 0.05 * float(np.median(left[~after])))
-    fast = float(np.median(left[after]) - np.median(left[~after]))
-    clear = fast > CLEAR * spread * np.sqrt(1 / n + 1 / np.count_nonzero(after))
-    return max(slow, 0.0), fast if clear else 0.0
 
 
 def rest_growth(compared: Compared, population: Population, shift: Shift | None) -> float:

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opamc_cli.decision.measurement.gear import told
-from opamc_cli.joint.change.energy import energy_of, rest_growth
+from opamc_cli.joint.change.energy import rest_growth
 from opamc_cli.joint.change.lines import fast_residuals, order_spectra
 from opamc_cli.joint.change.periodic import OF_THE_GEAR, find_periodic
 from opamc_cli.joint.change.reading import Cause, Reading
 from opamc_cli.joint.change.search import SCALE, find_slow_causes
-from opamc_cli.joint.change.slow import learn, shift_power, with_model
+from opamc_cli.joint.change.slow import learn, left_by, with_model
 from opamc_cli.joint.change.units import Compared, Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.fit.model import Term
@@ -30,11 +30,6 @@ LINES_DIFFER = 0.3**2
 SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
-
-HIDDEN = frozenset({"coulomb", "viscous", "thermal_viscous"})
-VISIBLE = 0.5
-"""Friction differs most between sessions: a shift of it of which the mean square shows less than
-half is hidden by what they differ by. Where other effects were found too, it is they that show."""
 
 HARMLESS_SHARE = 0.5
 FAULT_SHARE = 0.2
@@ -121,29 +116,23 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
     residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
     squares = np.bincount(compared.track.group + 1, residual**2, late.size + 1)[1:]
     left = squares / compared.dataset.fine.parts.counts
-    risen = bool(np.median(left[late]) > np.median(left[~late]))
+    fast = float(np.median(left[late]) - np.median(left[~late]))
     periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)
     # Where less is left in all, faint harmonics grow by themselves, as in the cold, and a share
     # would be one of nothing that the decision saw.
     periodic = [
         one
         for one in periodic
-        if risen or _doubled(one) or (one.effect == "ripple" and not one.faint)
+        if fast > 0 or _doubled(one) or (one.effect == "ripple" and not one.faint)
     ]
     held = max((one.power for one in periodic), default=0.0)
 
-    spread, fast = energy_of(compared, population)
-    # What each slow cause takes from the change's mean square, in their order.
-    rests = [sum(energy_of(compared, population, found.shift)) for found in slow]
-    # A line stands out of the spectrum before it stands out of the whole mean square.
+    # What each slow cause takes from the target's distance to the baseline's mean, in their order.
+    apart = [left_by(compared, population, one) for one in (None, *(one.shift for one in slow))]
+    rests = np.minimum.accumulate([float(np.mean(one[late])) for one in apart])
+    gains = -np.diff(rests)
     # Coefficients that do not lie outside the baseline's differ as healthy sessions' do.
-    moved = spread if slow else 0.0
-    gains = -np.diff(np.minimum.accumulate([spread + fast, *rests]))
-    powers = [shift_power(compared, found.shift) for found in slow]
-    friction = powers and {found.effect for found in slow} <= HIDDEN
-    if friction and spread < VISIBLE * powers[-1]:
-        # The mean square hardly shows the change: its own power is what there is of it.
-        moved, gains = powers[-1], np.diff(powers, prepend=0.0)
+    moved = max(float(rests[0] - np.mean(apart[0][~late])), float(gains.sum())) if slow else 0.0
     whole = max(moved + max(fast, held), SMALLEST_POWER)
     causes = [
         _weighed(found, gain / whole, library, serious=gain >= FAULT_SHARE * whole)

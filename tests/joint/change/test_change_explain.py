@@ -95,16 +95,6 @@ def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
     assert change_of("nothing", seed, wander=0.3).causes == ()
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("kind", "share"), [("friction", 1.0), ("payload", 0.0)])
-def test_friction_that_the_mean_square_does_not_show_is_measured_by_its_own(
-    monkeypatch, kind, share
-):
-    monkeypatch.setattr(explain, "energy_of", lambda *given, **named: (0.0, 0.0))
-    causes = change_of(kind).causes
-    assert sum(cause.share for cause in causes) == pytest.approx(share, abs=0.05)
-
-
 def test_a_current_that_is_always_zero_has_no_cause():
     made = simulate(1, (), 0.0, cycles=2, rate=250.0)
     dead = Recording("0", 250.0, current_a=np.zeros(made.time.size), position_rad=made.position)

@@ -4,11 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sessions import LIBRARY, TERMS, current_of, rows_of, units_of
+from sessions import LIBRARY, current_of, units_of
 
-from opamc_cli.joint.change.energy import comb_energy, energy_of, rest_growth
+from opamc_cli.joint.change.energy import comb_energy, rest_growth
 from opamc_cli.joint.change.lines import strokes
-from opamc_cli.joint.change.slow import Shift, shift_power
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.fit.parts import Sums, whole_parts
 from opamc_cli.joint.spectra import highest_order
@@ -39,63 +38,10 @@ def square(size):
     return np.sqrt(size) * np.array([1.0, -1.0, 1.0, -1.0])
 
 
-def energy(before, after):
-    """Of mean squares and offsets of both sides."""
-    sides = ([(square(size), moved) for size, moved in side] for side in (before, after))
-    return energy_of(compared_of(*sides), POPULATION)
-
-
-def test_what_the_mean_model_leaves_more_is_slow():
-    before = [(1.0, 0.3), (1.0, -0.3), (1.0, 0.0)]
-    # Each of three is a third of their mean: 4 / 2 of what they show is what they differ by.
-    expected = (4.0 + 1.0) / 2 - (4 / 2) * (0.09 + 0.09) / 3
-    found = energy(before, [(1.0, 2.0), (1.0, 1.0)])
-    assert found == (pytest.approx(expected), 0.0)
-    assert energy(before, [(1.0, 0.1)])[0] == 0.0
-
-
-def test_what_the_own_fits_leave_more_is_fast_where_it_is_clear():
-    before = [(0.9, 0.0), (1.0, 0.0), (1.1, 0.0)]
-    # A spread of 0.1 of three and one: 2.5 of its errors are 0.289.
-    limit = 2.5 * 0.1 * np.sqrt(1 / 3 + 1)
-    assert energy(before, [(1 + 1.01 * limit, 0.0)])[1] == pytest.approx(1.01 * limit)
-    assert energy(before, [(1 + 0.99 * limit, 0.0)])[1] == 0.0
-    # More units make it surer: their median counts.
-    three = [(5.0, 0.0), (1.25, 0.0), (1.2, 0.0)]
-    assert energy(before, three)[1] == pytest.approx(0.25)
-
-
-def test_sessions_that_agree_by_chance_differ_by_a_twentieth():
-    before = [(2.0, 0.0)] * 3
-    limit = 2.5 * 0.05 * 2 * np.sqrt(1 / 3 + 1)
-    assert energy(before, [(2 + 0.99 * limit, 0.0)])[1] == 0.0
-    assert energy(before, [(2 + 1.01 * limit, 0.0)])[1] > 0.0
-
-
 def test_the_rest_grows_by_its_share_of_the_current():
     units = compared_of([(square(1.0), 0.0)] * 2, [(square(3.0), 0.0)])
     # 25 and 1, 25 and 3 are the mean squares of the constant and the rest.
     assert rest_growth(units, POPULATION, None) == pytest.approx(3 / (25 + 3) * 26)
-
-
-def stiff(q, v, a, t):
-    return 0.5 * q
-
-
-def test_a_shift_that_is_taken_away_leaves_nothing_slow():
-    units = units_of(stiff, spread=0.0)
-    mean = np.array([0.2, 1.0, 0.4, 0.5, 0.3, 0.1])
-    population = SimpleNamespace(terms=TERMS, mean=mean)
-    shift = Shift((SPRING,), np.array([0.5, 0.0]), 0.0, 2)
-    position = units.dataset.coarse.track.position_rad
-    angles = [position[rows_of(units, unit)] for unit in range(4, 7)]
-    power = np.mean((0.5 * np.concatenate(angles)) ** 2)
-    before = energy_of(units, population)
-    assert sum(before) == pytest.approx(power, rel=0.05)
-    assert sum(energy_of(units, population, shift)) < 0.02 * power
-    assert shift_power(units, shift) == pytest.approx(power, rel=1e-2)
-    assert rest_growth(units, population, None) > 2
-    assert rest_growth(units, population, shift) == pytest.approx(1.0, abs=0.3)
 
 
 def combed(units, order, size, noise=0.01, harmonic=1, everywhere=False):

@@ -1,7 +1,6 @@
 """Slow effects by generalised least squares, against the same with the whole covariance."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +21,6 @@ from opamc_cli.joint.change.slow import (
     learn,
     left_by,
     shift_current,
-    shift_power,
     shifts,
     with_model,
 )
@@ -215,13 +213,3 @@ def test_a_shift_acts_in_the_target_alone(units, fine):
     assert not current[track.group < 4].any()
     own = SPRING.columns(track) @ shift.coefficients
     np.testing.assert_allclose(current[track.group >= 4], own[track.group >= 4])
-
-
-def test_a_shift_s_power_is_that_of_the_target_alone():
-    gram = np.array([81.0, 1.0, 9.0])[:, None, None] * 2
-    parts = SimpleNamespace(counts=np.array([2.0, 2.0, 2.0]))
-    units = SimpleNamespace(
-        after=np.array([False, True, True]), sums=lambda _: SimpleNamespace(gram=gram, parts=parts)
-    )
-    shift = SimpleNamespace(terms=(), coefficients=np.array([2.0]))
-    assert shift_power(units, shift) == pytest.approx((4 + 36) / 2)
