@@ -6,7 +6,6 @@ A further witness is one module with what `Witness` asks for, and its name in `W
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
@@ -31,11 +30,11 @@ class Witness(Protocol):
     def rows(
         self,
         place: Mapping[str, Any],
-        current: npt.NDArray[np.floating],
+        current: npt.NDArray[Any],
         fs_hz: float,
         config: PatternsConfig,
     ) -> list[dict[str, Any]]:
-        """Return what is kept of a segment, from its current: signed, or an envelope."""
+        """Return what is kept of a segment, from its current: a vector, or reported with a sign."""
 
     def evidence(
         self, baseline: pa.Table, target: pa.Table, axis: int, names: Names

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
@@ -11,7 +10,9 @@ from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.witnesses.amplitudes import AmplitudeCell, AmplitudeEvidence
 from opamc_cli.decision.witnesses.deviation import variance_within_sessions
 from opamc_cli.signal.amplitude import log_amplitudes
+from opamc_cli.signal.plausible.quality import bridged
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
+from opamc_cli.stages.recordings.envelope import course_of
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import AMPLITUDES, PLACE
 
@@ -22,13 +23,13 @@ SCHEMA = AMPLITUDES
 
 def rows(
     place: Mapping[str, Any],
-    current: npt.NDArray[np.floating],
+    current: npt.NDArray[Any],
     fs_hz: float,
     config: PatternsConfig,
 ) -> list[dict[str, Any]]:
     """Return the log amplitudes of a segment; none if one of its samples is unknown."""
     del fs_hz, config
-    amplitudes = log_amplitudes(current)
+    amplitudes = log_amplitudes(bridged(course_of(current)))
     if not amplitudes.size:
         return []
     own = {name: place[name] for name in PLACE}

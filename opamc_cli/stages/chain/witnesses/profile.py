@@ -3,14 +3,15 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.signal.course import mean_course
+from opamc_cli.signal.plausible.quality import bridged
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
+from opamc_cli.stages.recordings.envelope import course_of
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import PLACE, PROFILES
 
@@ -21,13 +22,13 @@ SCHEMA = PROFILES
 
 def rows(
     place: Mapping[str, Any],
-    current: npt.NDArray[np.floating],
+    current: npt.NDArray[Any],
     fs_hz: float,
     config: PatternsConfig,
 ) -> list[dict[str, Any]]:
     """Return the mean current in each part of a segment; none if it is too short for any."""
     del fs_hz
-    course = mean_course(current, config.parts)
+    course = mean_course(bridged(course_of(current)), config.parts)
     if not course.size:
         return []
     own = {name: place[name] for name in PLACE}

@@ -11,6 +11,8 @@ import pyarrow as pa
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.witnesses.deviation import variance_within_sessions
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
+from opamc_cli.signal.motion.rotation import torque_current
+from opamc_cli.signal.plausible.quality import bridged
 from opamc_cli.signal.transform.short_time import short_time_log_power
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
 from opamc_cli.storage.schemas import files
@@ -26,18 +28,20 @@ LEAST_LOG_POWER = -1.0
 
 def rows(
     place: Mapping[str, Any],
-    current: npt.NDArray[np.floating],
+    current: npt.NDArray[Any],
     fs_hz: float,
     config: PatternsConfig,
 ) -> list[dict[str, Any]]:
     """Return the spectrum of a segment's course; none if it is too short for any.
 
-    A reported current keeps its sign: its size has a corner wherever it passes zero, which moves
-    with friction and fills all bins (docs/decision.md has what each finds).
+    A current has its sign: its size has a corner wherever it passes zero, which moves with friction
+    and fills all bins (docs/decision.md has what each finds).
     """
     if not config.frames:
         return []
-    power = short_time_log_power(current, config.frames, config.bins)
+    if np.iscomplexobj(current):
+        current = torque_current(current, place["reference_f_max_hz"], fs_hz)
+    power = short_time_log_power(bridged(current), config.frames, config.bins)
     if not power.size:
         return []
     frames, bins = power.shape
