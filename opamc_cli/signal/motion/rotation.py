@@ -16,9 +16,8 @@ turns of 96 motions of the testbed's joint under load, whose torque changes sign
 2.4, over four by 0.1 to 3.4, over eight by 0.1 to 1.2, over sixteen they are short by one."""
 
 AXIS_TURNS = 2
-"""Turns at the highest frequency over which the torque's axis is told: of 86 motions of three arms by
-others 81 have the right sign in 99 % of the samples with a twentieth of the current or more, the
-worst in 91 %."""
+"""Turns at the highest frequency over which the torque's axis is told: of 86 motions of strangers'
+arms 81 have the right sign in 99 % of the samples of a twentieth of the current or more."""
 
 
 @dataclass(frozen=True)
