@@ -9,6 +9,7 @@ import numpy as np
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import Judgement
 from opamc_cli.joint.change.search import SCALE
+from opamc_cli.joint.change.slow import FRICTION_SPREAD
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.stages.verdict.wording.causes import ANY_FRICTION, meaning
 from opamc_cli.stages.verdict.wording.reasons import OF_SENSORS, is_small, logged
@@ -124,15 +125,17 @@ def _still(judgement: Judgement) -> bool:
 def own_friction(friction: Mapping[int, float], least: float) -> dict[int, tuple[float, float]]:
     """Return the joints whose friction moved as no condition moves it, with the others' median.
 
-    Both are relative changes; `least` is the one beside the others' from which it counts.
+    Both are relative changes; `least` is the one beside the others' from which it counts. Where
+    theirs has not moved it is no weather that excuses, but a load, which a fit takes for friction
+    (of a wrist that has hardly any 64 % more, under a quarter more payload).
     """
     logs = {axis: float(np.log(max(1 + one, 1e-3))) for axis, one in friction.items()}
     found = {}
     for axis, own in logs.items():
         others = [one for other, one in logs.items() if other != axis]
-        if len(others) < 2:
+        usual = float(np.median(others)) if len(others) > 1 else 0.0
+        if abs(usual) < FRICTION_SPREAD:
             continue
-        usual = float(np.median(others))
         within = min(0.0, AT_MOST * usual) <= own <= max(0.0, AT_MOST * usual)
         if not within and abs(own - usual) >= np.log1p(least):
             found[axis] = (friction[axis], float(np.expm1(usual)))

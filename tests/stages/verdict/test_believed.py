@@ -173,7 +173,8 @@ def test_much_friction_matters_though_it_is_little_of_the_current(grown, more, p
         ({1: 0.68, 2: 0.16, 3: 0.37, 4: 0.16}, {1}),
         ({1: -0.17, 2: -0.19, 3: -0.37, 4: -0.12}, set()),  # warmer alone
         ({1: 0.02, 2: 0.01, 3: 0.0, 4: 0.15, 5: 0.02, 6: -0.04}, set()),  # another tool
-        ({1: 0.0, 2: 0.5}, set()),  # of two nobody knows which
+        ({1: 0.01, 2: 0.01, 3: 0.0, 4: -0.01, 5: 0.64, 6: 0.0}, set()),  # more payload
+        ({1: 0.1, 2: 0.6}, set()),  # of two nobody knows which
     ],
 )
 def test_friction_that_no_condition_moves_so_is_a_joint_s_own(friction, own):
