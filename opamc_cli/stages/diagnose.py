@@ -19,6 +19,7 @@ from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.stages.verdict.decision import Decided, decide
+from opamc_cli.stages.verdict.wording.reasons import is_excused
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
@@ -200,7 +201,8 @@ def _diagnose(
         *([InputError(stranger)] if stranger else []),
     )
     in_part = frozenset(axis for error in of_target for axis in error.axes or decided.judgements)
-    found = findings.Findings(causes, unjudged.axes, unjudged.foreign)
+    friction = _friction(decided, config, kept)
+    found = findings.Findings(causes, unjudged.axes, unjudged.foreign, friction)
     findings.write_findings(out, found)
     head = verdict.header(sources, every_note, out, tables)
     written = verdict.write(decided, scored, config, out, found, head)
@@ -265,6 +267,27 @@ def _causes(
             continue
         causes[axis] = named if named.get("explained", 0.0) >= LEAST_SHARE else {}
     return causes, notes
+
+
+def _friction(decided: Decided, config: Config, kept: KeptResults | None) -> dict[int, float]:
+    """Tell by how much the joints' friction differs where some are excused by the others."""
+    judged = decided.judgements
+    if not config.joint.explain or len(judged) <= 2:
+        return {}
+    if not any(is_excused(one, config.score) for one in judged.values()):
+        return {}
+    cause, sides, found = _cause(), decided.sides, {}
+    moving = [cause.moving_samples(side.patterns) for side in (sides.baseline, sides.target)]
+    for axis in judged:
+        sources = (decided.baseline_sources(axis), decided.target_sources(axis))
+        spans = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
+        try:
+            differs = cause.friction(axis, *sources, config.joint, spans, kept)
+        except (ArithmeticError, LookupError, ValueError, InputError, NotEnoughDataError):
+            continue  # the others tell without it
+        if differs is not None:
+            found[axis] = differs
+    return found
 
 
 def _cause() -> ModuleType:

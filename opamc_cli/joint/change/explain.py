@@ -9,8 +9,8 @@ from opamc_cli.joint.change.energy import rest_growth
 from opamc_cli.joint.change.lines import fast_residuals, order_spectra
 from opamc_cli.joint.change.periodic import OF_THE_GEAR, find_periodic
 from opamc_cli.joint.change.reading import Cause, Reading
-from opamc_cli.joint.change.search import SCALE, find_slow_causes
-from opamc_cli.joint.change.slow import learn, left_by, with_model
+from opamc_cli.joint.change.search import SCALE, Grease, find_slow_causes
+from opamc_cli.joint.change.slow import Population, learn, left_by, with_model
 from opamc_cli.joint.change.units import Compared, Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.fit.model import Term
@@ -88,25 +88,43 @@ def explain_change(
     return _explained(sides, cycles, library)
 
 
-def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Change:
+def friction_change(
+    baseline: list[Recording], target: list[Recording], joint: Joint, follow: Follow = follow
+) -> float | None:
+    """Tell by how much friction differs, of 1; None without three baseline sessions or a model."""
+    sides = [read_side(baseline, joint, False, follow), read_side(target, joint, False)]
+    laid = _laid_out(sides, False, built_in_library()) if all(sides) and len(sides[0]) > 2 else ""
+    return None if isinstance(laid, str) else Grease.of(laid[0], laid[2]).whole
+
+
+def _laid_out(
+    sides: list[list[Track]], cycles: bool, library: Library
+) -> tuple[Compared, Compared, Population, tuple[Term, ...]] | str:
+    """Lay both sides beside the baseline's model, less what repeats and with it; or say why not."""
     compared = side_by_side(*sides)
     declared = [effect_named(library, name) for name in DECLARED]
     terms = tuple(Term(one, {}) for one in declared if one.untestable(compared.track) is None)
     compared = followed(compared, terms)
     late = compared.after
     if np.count_nonzero(~late) < 2 or not late.any():
-        why = "too few cycles or recordings whose torque axis can be followed"
-        return Change((), 0.0, False, why_not=why)
+        return "too few cycles or recordings whose torque axis can be followed"
     if not compared.sums(()).power[~late].any():
-        return Change((), 0.0, False, why_not="no current in the baseline")
+        return "no current in the baseline"
     population = learn(compared, terms, SESSIONS_DIFFER if cycles else 0.0)
     compared = plain = with_model(compared, population)
     if not cycles:
         compared = compared.less_repeated(terms)
-        late = compared.after
         population = learn(compared, terms)
         compared = with_model(compared, population)
+    return compared, plain, population, terms
 
+
+def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Change:
+    laid = _laid_out(sides, cycles, library)
+    if isinstance(laid, str):
+        return Change((), 0.0, False, why_not=laid)
+    compared, plain, population, terms = laid
+    late = compared.after
     joint = _told(compared, terms)
     if joint is not None:
         sides = [[by_motor(track, joint) for track in side] for side in sides]
@@ -125,7 +143,6 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
         for one in periodic
         if fast > 0 or _doubled(one) or (one.effect == "ripple" and not one.faint)
     ]
-    held = max((one.power for one in periodic), default=0.0)
 
     # What each slow cause takes from the target's distance to the baseline's mean, in their order.
     apart = [left_by(compared, population, one) for one in (None, *(one.shift for one in slow))]
@@ -133,13 +150,12 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
     gains = -np.diff(rests)
     # Coefficients that do not lie outside the baseline's differ as healthy sessions' do.
     moved = max(float(rests[0] - np.mean(apart[0][~late])), float(gains.sum())) if slow else 0.0
-    whole = max(moved + max(fast, held), SMALLEST_POWER)
+    whole = max(moved + max([fast, *(one.power for one in periodic)]), SMALLEST_POWER)
     causes = [
         _weighed(found, gain / whole, library, serious=gain >= FAULT_SHARE * whole)
         for found, gain in zip(slow, gains, strict=True)
     ]
-    loaded = any(cause.origin == "load" for cause in causes)
-    causes += _of_lines(periodic, whole, loaded, library)
+    causes += _of_lines(periodic, whole, any(one.origin == "load" for one in causes), library)
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -148,8 +164,7 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
     serious = any(cause.serious for cause in causes)
     others = [cause for cause in causes if cause.origin != "environment"]
     excused = len(others) < len(causes) and not serious
-    shift = slow[-1].shift if slow else None
-    if excused and rest_growth(plain, population, shift) >= GROWTH:
+    if excused and rest_growth(plain, population, slow[-1].shift if slow else None) >= GROWTH:
         causes = others
     harmless = sum(cause.share for cause in causes if cause.harmless)
     return Change(
@@ -188,10 +203,8 @@ def _of_lines(periodic: list[Reading], whole: float, loaded: bool, library: Libr
             named.append(_weighed(one, share, library, serious, clear))
     if not named:
         return []
-    share, serious, clear = (
-        max(getattr(one, name) for one in named) for name in ("share", "serious", "clear")
-    )
-    return [replace(named[0], share=share, serious=serious, clear=clear)]
+    most = ("share", "serious", "clear")
+    return [replace(named[0], **{one: max(getattr(n, one) for n in named) for one in most})]
 
 
 def _doubled(ripple: Reading) -> bool:

@@ -17,7 +17,7 @@ from opamc_cli.signal.motion.smoothing import (
     SHORTEST_WINDOW,
     averaging_kernel,
     blurred,
-    bridged,
+    bridged_path,
     clear_of_corners,
     derivatives,
     filled,
@@ -309,7 +309,7 @@ def _one(
         temperature = None
     others = None
     if beside and logged:
-        paths = [bridged(recording.others_rad[axis], rate) for axis in beside]
+        paths = [bridged_path(recording.others_rad[axis], rate) for axis in beside]
         others = np.stack(
             [derivatives(path, rate, motion.window, order) for order in range(3) for path in paths]
         ).T
@@ -367,9 +367,9 @@ def _logged_motion(recording: Recording, smoothing: Smoothing | None) -> tuple[M
     rate = recording.rate_hz
     if position is None:
         assert speed is not None
-        return motion_from_velocity(bridged(speed, rate), rate), np.isfinite(speed)
-    whole = None if speed is None else bridged(speed, rate)
-    motion = motion_from_position(bridged(position, rate), whole, rate, smoothing)
+        return motion_from_velocity(bridged_path(speed, rate), rate), np.isfinite(speed)
+    whole = None if speed is None else bridged_path(speed, rate)
+    motion = motion_from_position(bridged_path(position, rate), whole, rate, smoothing)
     return motion, np.isfinite(position)
 
 

@@ -15,6 +15,10 @@ SMOOTHED_TURNS = 8
 turns of 96 motions of the testbed's joint under load, whose torque changes sign, scatter by 1.1 to
 2.4, over four by 0.1 to 3.4, over eight by 0.1 to 1.2, over sixteen they are short by one."""
 
+AXIS_TURNS = 2
+"""Turns at the highest frequency over which the torque's axis is told: of 86 motions of strangers'
+arms 81 have the right sign in 99 % of the samples of a twentieth of the current or more."""
+
 
 @dataclass(frozen=True)
 class Rotation:
@@ -135,6 +139,49 @@ def turning_parts(
     steps = np.convolve(parts[1:] * parts[:-1].conj(), taper)[taper.size // 2 :][: count - 1]
     between = np.pad(np.angle(steps) / (2 * np.pi), 1, mode="edge")
     return parts, np.asarray((between[1:] + between[:-1]) / 2, dtype=np.float64)
+
+
+def turned(z: NDArray[np.complexfloating], f_max_hz: float, fs_hz: float) -> NDArray[np.float64]:
+    """Tell how far a motion's current vector has turned at each sample, (n,), turns.
+
+    Arguments as of `turning_parts`; where the vector is unknown its neighbours tell.
+    """
+    turns = turning_parts(np.where(np.isfinite(z), z, 0), f_max_hz, fs_hz)[1]
+    if not turns.size:
+        return np.zeros(z.size)
+    length = max(1, int(fs_hz / (PARTS_OF_A_TURN * f_max_hz)))
+    middles = (np.arange(turns.size) + 0.5) * length
+    return np.cumsum(np.interp(np.arange(z.size), middles, turns / length))
+
+
+def torque_current(
+    z: NDArray[np.complexfloating], f_max_hz: float, fs_hz: float
+) -> NDArray[np.float64]:
+    """Give a motion's current the sign that its envelope has lost.
+
+    The vector is turned back by how far it turns, which its neighbours tell where the current is
+    small; what is left hardly turns, and half the angle of its square is the torque's axis.
+
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Current vector; NaN where unknown.
+    f_max_hz : float
+        Highest frequency at which it turns, > 0, Hz.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    array, shape (n,), A
+        Current along that axis, of one sign or the other in all of the motion: which one the
+        phases do not tell. NaN where unknown.
+    """
+    still = np.where(np.isfinite(z), z, 0) * np.exp(-2j * np.pi * turned(z, f_max_hz, fs_hz))
+    taper = np.hanning(2 * int(AXIS_TURNS * fs_hz / f_max_hz / 2) + 3)
+    square = np.convolve(still**2, taper)[taper.size // 2 :][: z.size]
+    axis = np.unwrap(np.angle(square)) / 2
+    return np.where(np.isfinite(z), (still * np.exp(-1j * axis)).real, np.nan)
 
 
 @njit(cache=True, nogil=True)

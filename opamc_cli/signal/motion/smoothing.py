@@ -237,7 +237,7 @@ def filled(values: Floats) -> Floats:
     return np.interp(indices, indices[good], values[good])
 
 
-def bridged(path: Floats, rate_hz: float) -> Floats:
+def bridged_path(path: Floats, rate_hz: float) -> Floats:
     """Path, (n,), with gaps bridged by cubics as fast at their ends as the path is there.
 
     A straight line would begin and end by blows, of which a joint that rings says nothing.

@@ -15,11 +15,13 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import OpamcError
+from opamc_cli.signal.motion.rotation import torque_current
 from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_delay
 from opamc_cli.signal.plausible.quality import bridged
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import course_of
 from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS, PLACE
@@ -208,13 +210,16 @@ def _analyse(job: _Job) -> dict[str, pa.Table]:
     kept: dict[str, list[dict[str, Any]]] = {witness.FILE_NAME: [] for witness in WITNESSES}
     for row, current, whole in job.part.courses(config):
         fs_hz = row["sampling_rate_hz"]
-        patterns += _pattern_rows(row, np.abs(current), fs_hz, config)
+        patterns += _pattern_rows(row, np.abs(course_of(current)), fs_hz, config)
         # cut short, a segment's parts would not be those of the others
         if whole:
-            course = bridged(current)
+            course = bridged(course_of(current))
+            torque = course
+            if np.iscomplexobj(current):
+                torque = bridged(torque_current(current, row["reference_f_max_hz"], fs_hz))
             place = {name: row[name] for name in PLACE}
             for witness in WITNESSES:
-                if columns := witness.kept(course, fs_hz, config):
+                if columns := witness.kept(course, torque, fs_hz, config):
                     kept[witness.FILE_NAME].append({**place, **columns})
     patterns.sort(key=lambda row: (row["segment"], row["order"]))
     return {

@@ -123,10 +123,12 @@ def read_course(
         If the axis lacks the current that is wanted.
     """
     current = read_current(run, axis, start, stop, wanted)
-    if not np.iscomplexobj(current):
-        return current
-    vector = current - current.dtype.type(offset) if offset else current
-    return np.asarray(envelope(vector))
+    return course_of(current - current.dtype.type(offset) if offset else current)
+
+
+def course_of(current: npt.NDArray[Any]) -> npt.NDArray[np.floating]:
+    """Return the envelope of a current vector; a reported current as it is."""
+    return np.asarray(envelope(current)) if np.iscomplexobj(current) else current
 
 
 def read_current(

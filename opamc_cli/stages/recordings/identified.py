@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.signal.offset import TURNS_AT_TOP_SPEED
-from opamc_cli.stages.recordings.envelope import current_offset, read_course
+from opamc_cli.stages.recordings.envelope import current_offset, read_current
 from opamc_cli.storage.sources import RunSource
 
 
@@ -27,7 +27,7 @@ class IdentifiedPart:
 
     def courses(
         self, config: PatternsConfig
-    ) -> Iterator[tuple[dict[str, Any], npt.NDArray[np.floating], bool]]:
+    ) -> Iterator[tuple[dict[str, Any], npt.NDArray[Any], bool]]:
         """Yield what is counted, segment by segment.
 
         Yields
@@ -35,7 +35,8 @@ class IdentifiedPart:
         row
             Of the motion table, with the ends of the aligned segment.
         current
-            Its course, A, see `read_course`; the sensors' offset is taken off if that is wanted.
+            Its vector, or the signed reported current, A, see `read_current`; the sensors' offset
+            is taken off if that is wanted.
         whole
             Whether the recording holds all of it.
         """
@@ -45,7 +46,8 @@ class IdentifiedPart:
             if config.remove_offset:
                 offset = current_offset(run, self.axis, turning_motions(self.rows), config.envelope)
             for row, (start, stop) in zip(self.rows, spans, strict=True):
-                current = read_course(run, self.axis, start, stop, config.envelope, offset)
+                current = read_current(run, self.axis, start, stop, config.envelope)
+                current = current - current.dtype.type(offset) if offset else current
                 # a current without bound is a fault of the logger, not a rank
                 current = np.where(np.isinf(current), np.nan, current)
                 place = {**row, "start": start, "stop": min(stop, run.n_samples)}

@@ -17,6 +17,7 @@ from opamc_cli.decision.divergence.selection import self_consistency
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import course_of
 from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, SELECTION
@@ -129,7 +130,9 @@ def _count(
     for row, current, _ in part.courses(config):
         for order, gamma in settings:
             tau = time_delay(row["sampling_rate_hz"], row["reference_f_max_hz"], order, gamma)
-            found[order, gamma].append(ordinal_counts(np.abs(current), [order], tau)[order])
+            found[order, gamma].append(
+                ordinal_counts(np.abs(course_of(current)), [order], tau)[order]
+            )
     names = tuple(f"{row['run']}\n{row['cycle']}" for row in part.rows)
     motions = tuple(int(row["motion"]) for row in part.rows)
     return [

@@ -21,6 +21,7 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import course_of
 from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.stages.recordings.sessions import Sessions, lie_in_folders, sessions_of
 from opamc_cli.storage.schemas import files
@@ -170,7 +171,7 @@ def _count(part: IdentifiedPart, settings: Settings, config: PatternsConfig) -> 
     for _, current, _ in part.courses(config):
         for tau in dict.fromkeys(tau for _, tau in settings):
             orders = [order for order, other in settings if other == tau]
-            for order, values in ordinal_counts(np.abs(current), orders, tau).items():
+            for order, values in ordinal_counts(np.abs(course_of(current)), orders, tau).items():
                 counts[order, tau].append(values)
     return _Counted(part.rows, counts)
 

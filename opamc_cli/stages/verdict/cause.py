@@ -12,7 +12,7 @@ from opamc_cli.decision.measurement.at_rest import Fluctuation, fluctuation, gro
 from opamc_cli.decision.measurement.lag import Course, courses, lag_behind
 from opamc_cli.decision.measurement.sensors import SensorErrors, growth_of_errors, sensor_errors
 from opamc_cli.errors import NotEnoughDataError, OpamcError
-from opamc_cli.joint.change.explain import explain_change
+from opamc_cli.joint.change.explain import explain_change, friction_change
 from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
@@ -126,6 +126,28 @@ def explain(
     if found is None and change.why_not is not None:
         raise NotEnoughDataError(change.why_not)
     return found or {}
+
+
+def friction(
+    axis: int,
+    baseline: Sequence[RunSource],
+    target: Sequence[RunSource],
+    config: JointConfig,
+    moving: Mapping[str, tuple[int, int]],
+    kept: KeptResults | None = None,
+) -> float | None:
+    """Return by how much one joint's friction differs, of 1; arguments are those of `explain`.
+
+    None where no model of the joint tells.
+    """
+    seconds, rate_hz = 60.0 * config.explain_minutes, baseline[0].info.sampling_rate_hz
+    sides = [
+        [one.recording for one in _as_logged(axis, part[-MAX_RUNS:], seconds, moving, rate_hz)]
+        for part in (baseline, target)
+    ]
+    signed = [interpolated(one, LEAST_HZ) for one in with_signs([*sides[0], *sides[1]])]
+    n, joint = len(sides[0]), Joint(config.ratio_of(axis), config.poles_of(axis))
+    return friction_change(signed[:n], signed[n:], joint, following(kept))
 
 
 def follow_baseline(

@@ -30,6 +30,8 @@ class Findings:
     unjudged: Mapping[int, Sequence[str]] = field(default_factory=dict)
     foreign: frozenset[int] = frozenset()
     """Of these, the ones of another program or log."""
+    friction: Mapping[int, float] = field(default_factory=dict)
+    """By how much friction differs, of 1, where joints are excused by the others."""
 
 
 NOTHING_FOUND = Findings()
@@ -45,6 +47,7 @@ def write_findings(folder: Path, findings: Findings) -> None:
         "causes": {str(axis): dict(cause) for axis, cause in findings.causes.items()},
         "unjudged": {str(axis): list(why) for axis, why in findings.unjudged.items()},
         "foreign": sorted(findings.foreign),
+        "friction": {str(axis): value for axis, value in findings.friction.items()},
     }
     write_text(folder / files.FINDINGS, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
@@ -58,6 +61,7 @@ def read_findings(folder: Path, tables: tuple[Path, Path]) -> Findings:
             {int(axis): dict(cause) for axis, cause in content["causes"].items()},
             {int(axis): [str(each) for each in why] for axis, why in content["unjudged"].items()},
             frozenset(map(int, content.get("foreign", ()))),
+            {int(axis): float(value) for axis, value in content.get("friction", {}).items()},
         )
     except (InputError, ValueError, LookupError, TypeError, AttributeError):
         return NOTHING_FOUND

@@ -9,8 +9,9 @@ import numpy as np
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import Judgement
 from opamc_cli.joint.change.search import SCALE
+from opamc_cli.joint.change.slow import FRICTION_SPREAD
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.stages.verdict.wording.causes import meaning
+from opamc_cli.stages.verdict.wording.causes import ANY_FRICTION, meaning
 from opamc_cli.stages.verdict.wording.reasons import OF_SENSORS, is_small, logged
 
 MAIN_SHARE = 0.5
@@ -39,7 +40,14 @@ lost lubricant."""
 LONE_SENSOR = 0.5
 """Of a joint's own logged difference: where half of the others' lie below, it is its alone."""
 
+LESS_FRICTION_THAN_OTHERS = "less friction than the others' tells: a lost preload, or wear-in"
+
 LONE_SENSOR_TOO = "; check its temperature sensor, too, which alone has moved{}"
+
+AT_MOST = 3.0
+"""Times as much as its siblings' friction, as a logarithm, that a joint's may have moved by another
+temperature: of healthy joints 15 degrees off 2.5 at most. Where it moved the other way, or by more,
+and by `score.fault_effect` more or less than theirs, something else did."""
 
 ALIKE = {
     "payload_change": (SCALE.name, "spring"),
@@ -112,6 +120,54 @@ def among_siblings(
 
 def _still(judgement: Judgement) -> bool:
     return judgement.state == "healthy" and judgement.health_index < STILL
+
+
+def own_friction(friction: Mapping[int, float], least: float) -> dict[int, tuple[float, float]]:
+    """Return the joints whose friction moved as no condition moves it, with the others' median.
+
+    Both are relative changes; `least` is the one beside the others' from which it counts. Where
+    theirs has not moved it is no weather that excuses, but a load, which a fit takes for friction
+    (of a wrist that has hardly any 64 % more, under a quarter more payload).
+    """
+    logs = {axis: float(np.log(max(1 + one, 1e-3))) for axis, one in friction.items()}
+    found = {}
+    for axis, own in logs.items():
+        others = [one for other, one in logs.items() if other != axis]
+        usual = float(np.median(others)) if len(others) > 1 else 0.0
+        if abs(usual) < FRICTION_SPREAD:
+            continue
+        within = min(0.0, AT_MOST * usual) <= own <= max(0.0, AT_MOST * usual)
+        if not within and abs(own - usual) >= np.log1p(least):
+            found[axis] = (friction[axis], float(np.expm1(usual)))
+    return found
+
+
+def of_friction(own: float, others: float, p_value: float) -> Mapping[str, Any]:
+    """Return the cause of verdict.json where a joint's friction alone moved so."""
+    amount = (
+        f"the joint's friction has {_moved_by(own)}, that of the others has {_moved_by(others)}"
+    )
+    kind = ANY_FRICTION if own > others else LESS_FRICTION_THAN_OTHERS
+    return {
+        "effect": "coulomb",
+        "domain": "velocity",
+        "parameters": {},
+        "interpretation": f"{kind}; {amount}",
+        "share": 1.0,
+        "p_value": p_value,
+        "ties": ["viscous"],
+        "harmless": False,
+        "origin": "joint",
+        "explained": 1.0,
+        "clear": False,
+        "evidence": {"relative_change": own, "relative_change_of_others": others},
+        "why": [f"{amount[0].upper()}{amount[1:]}: no condition moves one joint's so."],
+        "others": [],
+    }
+
+
+def _moved_by(change: float) -> str:
+    return f"{'grown' if change >= 0 else 'fallen'} by {abs(change):.0%}"
 
 
 def believed(

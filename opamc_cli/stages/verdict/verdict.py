@@ -27,7 +27,13 @@ from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.decision import Decided
 from opamc_cli.stages.verdict.findings import NOTHING_FOUND, Findings
-from opamc_cli.stages.verdict.state import among_siblings, believed, with_cause
+from opamc_cli.stages.verdict.state import (
+    among_siblings,
+    believed,
+    of_friction,
+    own_friction,
+    with_cause,
+)
 from opamc_cli.stages.verdict.wording.brief import brief
 from opamc_cli.stages.verdict.wording.reasons import is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
@@ -79,7 +85,7 @@ def write(
     head
         What the verdict says besides its axes; see `header`.
     """
-    judged = content(decided, scored, config, found.causes)
+    judged = content(decided, scored, config, found.causes, found.friction)
     unsure = decided.with_files(not_sure(judged, config.score, found.foreign))
     crossed = exchanged_joints(decided.sides, decided.target_runs(), judged)
     verdict = with_reasons(judged, {**unsure, **crossed, **found.unjudged}) | dict(head or {})
@@ -143,8 +149,10 @@ def content(
     scored: ScoreOutcome,
     config: Config,
     causes: Mapping[int, Mapping[str, Any]],
+    friction: Mapping[int, float],
 ) -> dict[str, Any]:
     """Return the content of verdict.json."""
+    own = own_friction(friction, config.score.fault_effect)
     jsd = _divergences(scored.scores)
     pooled = _pooled_features(scored.features)
     sides = (decided.sides.baseline, decided.sides.target)
@@ -156,6 +164,11 @@ def content(
         in_vain = causes.get(axis) == {}
         cause = believed(judgement, causes.get(axis) or None, config.score)
         cause = among_siblings(axis, cause, decided.judgements, warmer)
+        if axis in own and is_excused(judgement, config.score):
+            cause, judgement = (
+                of_friction(*own[axis], judgement.p_value),
+                replace(judgement, state="fault"),
+            )
         final = with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None

@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.signal.motion.rotation import RotationStream, join_rotation, turning_parts
+from opamc_cli.signal.motion.rotation import (
+    RotationStream,
+    join_rotation,
+    torque_current,
+    turned,
+    turning_parts,
+)
 
 
 def rotation_of(z, step=16):
@@ -94,3 +100,34 @@ def test_what_is_too_short_does_not_turn():
     assert turns == pytest.approx(100 / 2048, rel=1e-3)
     for n in (0, 1):
         assert turning_parts(one_hz[:n], 100.0, 2048.0)[1].tolist() == [0.0] * n
+
+
+def swinging(f_hz, noise, seed=0):
+    """A vector that turns there and back, of a current that passes zero three times."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, 4000)
+    rate = f_hz * np.sin(np.pi * t)
+    torque = np.sin(2 * np.pi * 1.7 * t) + 0.05 * np.sin(2 * np.pi * 23 * t)
+    turns = np.cumsum(rate) / 2000
+    z = torque * np.exp(1j * (2 * np.pi * turns + 0.7))
+    return z + noise * (rng.normal(size=t.size) + 1j * rng.normal(size=t.size)), torque, turns
+
+
+@pytest.mark.parametrize("f_hz", [15.0, 60.0, -200.0])
+def test_a_current_gets_its_sign_back_wherever_it_passes_zero(f_hz):
+    z, torque, _ = swinging(f_hz, 0.01)
+    z[1700:1703] = np.nan
+    found = torque_current(z, abs(f_hz), 2000.0)
+    assert np.isnan(found[1700:1703]).all()
+    known = np.isfinite(found)
+    sign = np.sign(found[known] @ torque[known])
+    np.testing.assert_allclose(sign * found[known], torque[known], atol=0.08)
+
+
+def test_a_vector_tells_how_far_it_has_turned_whatever_its_current():
+    z, torque, turns = swinging(60.0, 0.01)
+    found = turned(z, 60.0, 2000.0)
+    np.testing.assert_allclose(found - found[2000], turns - turns[2000], atol=0.2)
+    warm = turned(z * np.where(torque > 0, 0.5, 1.5), 60.0, 2000.0)
+    np.testing.assert_allclose(warm, found, atol=0.2)
+    assert not turned(z[:1], 60.0, 2000.0).any()

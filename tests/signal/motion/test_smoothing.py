@@ -9,7 +9,7 @@ from opamc_cli.signal.motion.smoothing import (
     averaged,
     averaging_kernel,
     block_mean,
-    bridged,
+    bridged_path,
     derivatives,
     filled,
     measurement_noise,
@@ -144,7 +144,7 @@ def test_a_gap_in_a_path_is_bridged_without_a_blow(rate_hz, first_s):
     gap = slice(first, first + round(0.2 * rate_hz))
     lacking = path.copy()
     lacking[gap] = np.nan
-    found = bridged(lacking, rate_hz)
+    found = bridged_path(lacking, rate_hz)
     known = np.isfinite(lacking)
     np.testing.assert_array_equal(found[known], path[known])
     assert np.abs(found - path).max() < np.abs(filled(lacking) - path).max()
@@ -157,7 +157,7 @@ def test_gaps_of_one_sample_and_at_the_ends_are_bridged_too():
     path = np.arange(50.0) ** 2
     lacking = path.copy()
     lacking[[0, 20, 49]] = np.nan
-    found = bridged(lacking, 100.0)
+    found = bridged_path(lacking, 100.0)
     assert found[20] == pytest.approx(400.0)
     assert (found[0], found[49]) == (1.0, 48.0**2)
-    assert np.isnan(bridged(np.full(3, np.nan), 100.0)).all()
+    assert np.isnan(bridged_path(np.full(3, np.nan), 100.0)).all()

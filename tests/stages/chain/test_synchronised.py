@@ -47,6 +47,40 @@ def test_a_joint_whose_position_is_logged_is_synchronised_by_it(tmp_path, delay,
     np.testing.assert_allclose(*starts, atol=2)
 
 
+def save_phases(path, friction, seed):
+    """The same motion in phases; with less friction its current comes through zero earlier."""
+    rng = np.random.default_rng(seed)
+    n = 1200
+    way = 0.5 - 0.5 * np.cos(np.pi * np.arange(n) / n)
+    cycle = np.concatenate([np.zeros(300), way, np.ones(300), 1 - way])
+    angle = 2 * np.pi * 20 * np.tile(cycle, CYCLES)
+    speed = np.gradient(angle)
+    acceleration = np.gradient(speed)
+    current = acceleration / abs(acceleration).max() + friction * speed / speed.max()
+    turns = angle[:, None] - 2 * np.pi / 3 * np.arange(3)
+    phases = current[:, None] * np.cos(turns) + 0.005 * rng.normal(size=(angle.size, 3))
+    columns = {f"axis1_{name}": one for name, one in zip("abc", phases.T, strict=True)}
+    save_run(path, RunInfo(sampling_rate_hz=1000.0), columns)
+
+
+def test_phases_are_synchronised_by_how_far_they_turn(tmp_path):
+    """By the course of the envelope, which friction bends, the way there was 0.1 s off."""
+    save_phases(tmp_path / "baseline/1.parquet", 1.5, 1)
+    save_phases(tmp_path / "target/1.parquet", 0.4, 2)
+    baseline = run_chain([tmp_path / "baseline"], load_config(), tmp_path / "b")
+    target = run_chain(
+        [tmp_path / "target"], load_config(), tmp_path / "t", reference=baseline.motions
+    )
+    own, other = (
+        [row for row in pq.read_table(one.motions).to_pylist() if row["motion"] >= 0]
+        for one in (baseline, target)
+    )
+    places = {row["segment"]: row["start"] + row["lag"] for row in own}
+    apart = [row["start"] + row["lag"] - places[row["segment"]] for row in other]
+    assert len(apart) >= CYCLES
+    assert max(map(abs, apart)) <= 10
+
+
 def test_the_reference_is_the_cycle_that_most_recordings_hold(tmp_path):
     """The first one is odd: its way back is half as long."""
     for number in range(4):

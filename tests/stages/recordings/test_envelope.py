@@ -78,6 +78,7 @@ def test_a_motion_s_reference_tells_whether_its_offset_is_taken_off(tmp_path, sa
             source = RunSource.of(run)
         courses = IdentifiedPart(source, 1, tuple(rows)).courses(load_config().patterns)
         error = max(
-            np.abs(course - torque[r["start"] : r["stop"]]).max() for r, course, _ in courses
+            np.abs(np.abs(course) - torque[r["start"] : r["stop"]]).max()
+            for r, course, _ in courses
         )
         assert (error < 0.1) == taken_off

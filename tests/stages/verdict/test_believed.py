@@ -7,7 +7,13 @@ import pytest
 
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.stages.verdict.decision import Decided
-from opamc_cli.stages.verdict.state import among_siblings, believed, with_cause
+from opamc_cli.stages.verdict.state import (
+    among_siblings,
+    believed,
+    of_friction,
+    own_friction,
+    with_cause,
+)
 
 GREASE = {"effect": "thermal_viscous", "harmless": True, "origin": "environment"}
 PAYLOAD = {"effect": "payload_change", "harmless": True, "origin": "load"}
@@ -154,3 +160,28 @@ def test_much_friction_matters_though_it_is_little_of_the_current(grown, more, p
     evidence = {} if grown is None else {"relative_change": grown}
     cause = {"effect": "coulomb", "origin": "joint", "explained": 0.9, "evidence": evidence}
     assert with_cause(one, cause | more, config).state == state
+
+
+@pytest.mark.parametrize(
+    ("friction", "own"),
+    [
+        ({1: -0.22, 2: 0.15, 3: -0.15}, {2}),  # 40 % more in a warmer hall
+        (
+            {1: 0.13, 2: 0.23, 3: 0.18, 4: 0.26, 5: -0.13, 6: 0.18},
+            {5},
+        ),  # a preload lost in the cold
+        ({1: 0.68, 2: 0.16, 3: 0.37, 4: 0.16}, {1}),
+        ({1: -0.17, 2: -0.19, 3: -0.37, 4: -0.12}, set()),  # warmer alone
+        ({1: 0.02, 2: 0.01, 3: 0.0, 4: 0.15, 5: 0.02, 6: -0.04}, set()),  # another tool
+        ({1: 0.01, 2: 0.01, 3: 0.0, 4: -0.01, 5: 0.64, 6: 0.0}, set()),  # more payload
+        ({1: 0.1, 2: 0.6}, set()),  # of two nobody knows which
+    ],
+)
+def test_friction_that_no_condition_moves_so_is_a_joint_s_own(friction, own):
+    assert own_friction(friction, 0.3).keys() == own
+
+
+def test_a_joint_s_own_friction_is_a_fault_of_it():
+    cause = of_friction(0.15, -0.18, 1e-6)
+    assert with_cause(Judged("fault", 5.0, 0.0), cause, ScoreConfig()).state == "fault"
+    assert "grown by 15%, that of the others has fallen by 18%" in cause["interpretation"]

@@ -28,9 +28,17 @@ class Witness(Protocol):
     """Of its table; `run`, `axis`, `cycle`, `motion` and `segment` say what a row is of."""
 
     def kept(
-        self, current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig
+        self,
+        course: npt.NDArray[np.floating],
+        torque: npt.NDArray[np.floating],
+        fs_hz: float,
+        config: PatternsConfig,
     ) -> dict[str, Any]:
-        """Return its columns of a segment, from its current: signed, or an envelope; or none."""
+        """Return its columns of a segment, or none.
+
+        From the current with its sign where one is reported, else its envelope; and from the
+        current with the torque's sign, which three phases tell too. Both have shape (n,), A.
+        """
 
     def evidence(
         self, baseline: pa.Table, target: pa.Table, axis: int, names: Names

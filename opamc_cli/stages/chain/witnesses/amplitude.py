@@ -19,10 +19,15 @@ FILE_NAME = files.AMPLITUDES
 SCHEMA = AMPLITUDES
 
 
-def kept(current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig) -> dict[str, Any]:
+def kept(
+    course: npt.NDArray[np.floating],
+    torque: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> dict[str, Any]:
     """Return the log amplitudes of a segment; none if one of its samples is unknown."""
-    del fs_hz, config
-    amplitudes = log_amplitudes(current)
+    del torque, fs_hz, config
+    amplitudes = log_amplitudes(course)
     return {"parts": amplitudes.size, "log_amplitude": amplitudes} if amplitudes.size else {}
 
 

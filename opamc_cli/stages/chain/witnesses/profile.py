@@ -18,11 +18,16 @@ FILE_NAME = files.PROFILES
 SCHEMA = PROFILES
 
 
-def kept(current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig) -> dict[str, Any]:
+def kept(
+    course: npt.NDArray[np.floating],
+    torque: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> dict[str, Any]:
     """Return the mean current in each part of a segment; none if it is too short for any."""
-    del fs_hz
-    course = mean_course(current, config.parts)
-    return {"parts": course.size, "current_a": course} if course.size else {}
+    del torque, fs_hz
+    means = mean_course(course, config.parts)
+    return {"parts": means.size, "current_a": means} if means.size else {}
 
 
 def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> ProfileEvidence:

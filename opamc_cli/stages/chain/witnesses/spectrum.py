@@ -23,19 +23,25 @@ LEAST_LOG_POWER = -1.0
 """Beside the median of all sessions: what is below counts as this."""
 
 
-def kept(current: npt.NDArray[np.floating], fs_hz: float, config: PatternsConfig) -> dict[str, Any]:
+def kept(
+    course: npt.NDArray[np.floating],
+    torque: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> dict[str, Any]:
     """Return the spectrum of a segment's course; none if it is too short for any.
 
-    A reported current keeps its sign: its size has a corner wherever it passes zero, which moves
-    with friction and fills all bins (docs/decision.md has what each finds).
+    Of the current with its sign: its size has a corner wherever it passes zero, which moves with
+    friction and fills all bins (docs/decision.md has what each finds).
     """
+    del course
     if not config.frames:
         return {}
-    power = short_time_log_power(current, config.frames, config.bins)
+    power = short_time_log_power(torque, config.frames, config.bins)
     if not power.size:
         return {}
     frames, bins = power.shape
-    bin_hz = fs_hz / (2 * current.size // (frames + 1))
+    bin_hz = fs_hz / (2 * torque.size // (frames + 1))
     return {"frames": frames, "bins": bins, "bin_hz": bin_hz, "log_power": power.ravel()}
 
 

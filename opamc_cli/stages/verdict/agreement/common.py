@@ -31,8 +31,15 @@ def not_sure(
         Axes that cannot be compared at all, since their target is of another program or log.
     """
     far = far_together(verdict, limits)
+    # what the others tell of conditions has been taken off those already
+    alone = {
+        one["axis"]
+        for one in verdict["axes"]
+        if "relative_change_of_others" in (one["cause"] or {}).get("evidence", ())
+    }
     left = left_alone(verdict, far, foreign) | under_payload(verdict)
     left = carried(verdict, limits, far) | left
+    left = {axis: why for axis, why in left.items() if axis not in alone}
     return far_together(verdict, limits, left) | left
 
 
