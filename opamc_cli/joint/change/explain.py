@@ -10,7 +10,7 @@ from opamc_cli.joint.change.lines import fast_residuals, order_spectra
 from opamc_cli.joint.change.periodic import OF_THE_GEAR, find_periodic
 from opamc_cli.joint.change.reading import Cause, Reading
 from opamc_cli.joint.change.search import SCALE, Grease, find_slow_causes
-from opamc_cli.joint.change.slow import Population, learn, left_by, with_model
+from opamc_cli.joint.change.slow import Population, learn, left_by, shift_power, with_model
 from opamc_cli.joint.change.units import Compared, Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.fit.model import Term
@@ -148,6 +148,9 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
     apart = [left_by(compared, population, one) for one in (None, *(one.shift for one in slow))]
     rests = np.minimum.accumulate([float(np.mean(one[late])) for one in apart])
     gains = -np.diff(rests)
+    if slow and not gains.any():
+        # What sessions differ by hides it: its own power is what there is of it.
+        gains[-1] = shift_power(compared, slow[-1].shift)
     # Coefficients that do not lie outside the baseline's differ as healthy sessions' do.
     moved = max(float(rests[0] - np.mean(apart[0][~late])), float(gains.sum())) if slow else 0.0
     whole = max(moved + max([fast, *(one.power for one in periodic)]), SMALLEST_POWER)

@@ -42,6 +42,10 @@ by a change of it."""
 
 LARGEST_P = 0.015
 PLANNED_P = 0.05
+HIDDEN_P = 0.001
+"""Below which dry or viscous friction counts as the first cause though the target lies no farther
+from the baseline's mean than its own sessions do: what those differ by may happen to hide it."""
+
 SMALLEST_GAIN = 0.03
 """What explains less of the slow change is not worth a maintainer's time."""
 
@@ -285,7 +289,11 @@ def _next(
     most = max(gains.values())
     usual = float(np.mean(left_by(compared, population)[~late]))
     if most < SMALLEST_GAIN * max(left - usual, 0.0) or most <= 0:
-        return None
+        # Friction differs most between sessions, and what they differ by may happen to hide it.
+        surest = min(sure, key=lambda name: sure[name][0])
+        if chosen or surest not in rubs or sure[surest][0] > HIDDEN_P:
+            return None
+        gains, most = {surest: 0.0}, 0.0
     # Among those that explain the change equally well, the simplest is named.
     rank = [*EXPECTED, *gains].index
     ordered = sorted(gains, key=lambda one: (sure[one][1].width, rank(one), sure[one][0]))

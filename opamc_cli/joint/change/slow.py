@@ -185,3 +185,10 @@ def shift_current(compared: Compared, shift: Shift | None, fine: bool = True) ->
     columns = [compared.dataset.columns(term, fine) for term in shift.terms]
     acting = np.append(compared.after, False)[compared.dataset.grid_of(fine).track.group]
     return acting * (np.concatenate(columns, axis=1) @ shift.coefficients)
+
+
+def shift_power(compared: Compared, shift: Shift) -> float:
+    """Mean square of a shift's own current in the target's units, A^2."""
+    sums = compared.sums(shift.terms)
+    powers = np.einsum("i,uij,j->u", shift.coefficients, sums.gram, shift.coefficients)
+    return float(np.mean((powers / sums.parts.counts)[compared.after]))

@@ -95,6 +95,12 @@ def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
     assert change_of("nothing", seed, wander=0.3).causes == ()
 
 
+def test_friction_that_the_mean_square_does_not_show_is_measured_by_its_own(monkeypatch):
+    monkeypatch.setattr(explain, "left_by", lambda compared, *given: np.ones(compared.after.size))
+    causes = change_of("friction").causes
+    assert sum(cause.share for cause in causes) == pytest.approx(1.0, abs=0.05)
+
+
 def test_a_current_that_is_always_zero_has_no_cause():
     made = simulate(1, (), 0.0, cycles=2, rate=250.0)
     dead = Recording("0", 250.0, current_a=np.zeros(made.time.size), position_rad=made.position)

@@ -280,8 +280,12 @@ def test_what_a_ripple_leaves_in_the_slow_current_is_no_cause():
     assert causes_of(lambda q, v, a, t: 0.1 * np.cos(50 * q + 1)) == []
 
 
-def test_what_brings_the_target_no_nearer_to_the_baseline_is_no_cause(monkeypatch):
+def test_only_friction_is_a_first_cause_that_the_mean_square_does_not_show(monkeypatch):
     monkeypatch.setattr(search, "left_by", lambda compared, *given: np.ones(compared.after.size))
+    assert [cause.effect for cause in causes_of(heavy)] == ["coulomb"]
+    assert causes_of(payload, library=only("payload_change")) == []
+    assert causes_of(stiff, library=only("spring")) == []
+    monkeypatch.setattr(search, "HIDDEN_P", 0.0)
     assert causes_of(heavy) == []
 
 
