@@ -7,7 +7,7 @@ from carriers import Move, record
 
 from opamc_cli.config import load_config
 from opamc_cli.stages.chain import segment
-from opamc_cli.stages.chain.segments.rows import Flags
+from opamc_cli.stages.chain.segments.rows import Flags, lost_spans
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
@@ -121,3 +121,11 @@ def test_stretches_are_told_across_blocks():
     np.testing.assert_array_equal(told, so)
     assert flags.share == np.mean(so)
     assert flags.spans(4) == [(a, b) for a, b in flags.spans() if b - a >= 4]
+
+
+def test_what_is_bridged_is_not_lost_however_slow_the_log():
+    for n, spans in ((3, []), (4, [(50, 54)])):
+        unknown, held = Flags(), Flags()
+        for flags, length in ((unknown, n), (held, 0)):
+            flags.push((np.arange(200) >= 50) & (np.arange(200) < 50 + length))
+        assert lost_spans(unknown, held, 10.0) == spans

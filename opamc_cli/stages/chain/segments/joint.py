@@ -55,6 +55,13 @@ def joint_segments(
     assert name is not None
     velocity, source = _velocity(run, channels)
     current = run.read([name])[name]
+    known = current[np.isfinite(current)]
+    if not known.size:
+        msg = (
+            f"{run.path}: column {name} holds no number in {run.n_samples} samples; "
+            "check the drive's log or leave the axis out"
+        )
+        raise InputError(msg)
     whole = np.isfinite(current)
     for column in filter(None, (channels.position, channels.velocity)):
         logged = np.isfinite(run.read([column])[column])
@@ -66,13 +73,6 @@ def joint_segments(
     odd = (current != 0) & (current != np.nanmax(current)) & (current != np.nanmin(current))
     held.push((np.diff(current, prepend=np.nan) == 0) & odd)
     gaps = lost_spans(unknown, held, run.sampling_rate_hz)
-    known = current[np.isfinite(current)]
-    if not known.size:
-        msg = (
-            f"{run.path}: column {name} holds no number in {run.n_samples} samples; "
-            "check the drive's log or leave the axis out"
-        )
-        raise InputError(msg)
     by_speed = source == channels.velocity
     speed_of, kind = (source, "velocity") if by_speed else (f"{source} (its speed)", "position")
     beyond = [

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from opamc_cli.signal.plausible.quality import LIMITS
+from opamc_cli.signal.plausible.quality import LIMITS, MOST_BRIDGED
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
@@ -96,7 +96,7 @@ def lost_spans(unknown: Flags, held: Flags, rate_hz: float) -> list[tuple[int, i
 
     Values are kept by a logger that waits for its bus, if they change with nearly each sample else.
     """
-    least = EDGE_S * rate_hz
+    least = max(EDGE_S * rate_hz, MOST_BRIDGED + 1)
     kept = held.spans(max(least, FEWEST_HELD)) if held.share < RARELY else []
     return unknown.spans(least) + kept
 
