@@ -93,6 +93,18 @@ def test_an_effect_of_fifteen_times_the_noise_does_not_hide(motion, effect):
     assert loop.rmse_after_a < 1.5 * 0.02
 
 
+@pytest.mark.parametrize("effect", ["position_drag", *map(long, ("spring", "ripple", "stribeck"))])
+def test_which_way_a_joint_counts_and_from_where_moves_nothing(effect):
+    joint = joint_of("cyclic", SHAPES[effect], strength=5.0)
+    mirrored = replace(joint, position_rad=-joint.position_rad, current_a=-joint.current_a)
+    shifted = replace(joint, position_rad=joint.position_rad + 1.234)
+    loop, *others = map(close, (joint, mirrored, shifted))
+    assert effect in names_of(loop)[0]
+    for other in others:
+        assert (other.verdict, names_of(other)) == (loop.verdict, names_of(loop))
+        assert other.rmse_after_a == pytest.approx(loop.rmse_after_a, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("quantum", "rate", "before", "left"), [(1e-5, 250.0, 5, 0.4), long(1e-4, 1000.0, 2.5, 0.6)]
 )
