@@ -282,8 +282,8 @@ def _missing_samples(step: Seconds, rounding_s: float) -> npt.NDArray[np.bool_]:
     """Return which steps a sample is missing in.
 
     A stamp that comes late makes a long step too, but a short one beside it: the three together
-    are then no longer than three. Stamps that are rounded step by turns over and under the period,
-    which is the mean of both and not the commoner one (of 418 Hz in whole milliseconds it made 473).
+    are then no longer than three. Rounded stamps step by turns over and under the period, which
+    is the mean of both and not the commoner one: 418 Hz in whole milliseconds were taken for 473.
 
     Examples
     --------
