@@ -97,6 +97,11 @@ def run(arguments: list[str]) -> int:
     try:
         code = app(args=arguments, prog_name="opamc", standalone_mode=False)
     except _WrongUsage as error:
+        message = getattr(error, "message", "")
+        if "unexpected extra argument" in message and {"--baseline", "--target"} & {*arguments}:
+            # the shell has made several files of a pattern, of which an option takes one
+            hint = "put a pattern in quotes, as in --baseline 'runs/*.parquet', or name a folder"
+            setattr(error, "message", f"{message}; {hint}")  # noqa: B010 - as below
         getattr(error, "show")()  # noqa: B009 - of a class that typer does not name
         return int(ExitCode.USAGE)
     except Interrupted:

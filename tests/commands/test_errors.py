@@ -461,6 +461,13 @@ def test_a_diagnosis_of_what_is_left(opamc, tmp_path, pair):
     assert (tmp_path / "out" / "report.html").exists()
 
 
+def test_a_pattern_that_the_shell_has_spread_is_told_to_be_quoted(opamc):
+    ended = opamc("diagnose", "--baseline", "a.parquet", "b.parquet", "--target", "c.parquet")
+    assert ended.code == ExitCode.USAGE
+    assert "put a pattern in quotes, as in --baseline 'runs/*.parquet'" in ended.err
+    assert "in quotes" not in opamc("config", "show", "more").err
+
+
 def test_a_baseline_in_which_nothing_repeats(opamc, tmp_path, pair):
     part = bad_runs.part(tmp_path / "part.parquet", 2000, 3000)
     ended = opamc("diagnose", "--baseline", part, "--target", pair[0], "--out", tmp_path / "out")

@@ -7,6 +7,7 @@ import typer
 
 from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
+from opamc_cli.errors import ExitCode
 from opamc_cli.storage.schemas import files
 
 
@@ -35,6 +36,7 @@ def identify(
     from opamc_cli.config import load_config
     from opamc_cli.stages.chain import identify as stage
     from opamc_cli.stages.chain.compared.speeds import of_another_speed
+    from opamc_cli.stages.chain.cycles.reference import why_untold
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
 
@@ -67,4 +69,8 @@ def identify(
         str(outcome.path),
     )
     left_out = [f"{run}: {of_another_speed(r)}" for run, r in outcome.other_speeds.items()]
-    raise typer.Exit(output.failures([*map(str, outcome.errors), *left_out], len(found)))
+    failed = [*map(str, outcome.errors), *left_out]
+    if failed or any(each["cycles"] for each in found):
+        raise typer.Exit(output.failures(failed, len(found)))
+    output.failure(f"{outcome.path}: no cycle was told: {why_untold(outcome.table)}")
+    raise typer.Exit(ExitCode.NOT_ENOUGH_DATA)

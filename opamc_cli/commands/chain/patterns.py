@@ -7,6 +7,7 @@ import typer
 
 from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
+from opamc_cli.errors import ExitCode
 from opamc_cli.storage.schemas import files
 
 
@@ -56,4 +57,8 @@ def patterns(
         ),
         str(published(outcome.path)),
     )
+    if not counted and not outcome.errors:
+        where = motions or out / files.MOTIONS
+        output.failure(f"{where}: no motion is told, so there is nothing to count")
+        raise typer.Exit(ExitCode.NOT_ENOUGH_DATA)
     raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(counted)))

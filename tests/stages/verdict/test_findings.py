@@ -105,9 +105,21 @@ def test_currents_that_are_all_of_another_size_are_of_another_unit(times, noise,
 )
 def test_a_current_that_is_scaled_down_to_its_noise_is_of_another_unit(times, noise, refused):
     """A grinding gear may ask for twelve times as much, but not of the sensor's noise."""
-    own = SimpleNamespace(axis=2, size={"current": times}, steps=(0.0, 0.01 * noise))
-    usual = SimpleNamespace(size={(2, "current"): 1.0}, steps={2: (0.0, 0.01)})
+    own = SimpleNamespace(axis=2, size={"current": times}, steps=(0.0, 0.01 * noise), level=None)
+    usual = SimpleNamespace(size={(2, "current"): 1.0}, steps={2: (0.0, 0.01)}, level={2: 0.0})
     assert (_other_unit(own, usual) is not None) == refused
+
+
+@pytest.mark.parametrize(
+    ("swings", "level", "refused"),
+    [(44.0, 2.9, None), (44.0, 44.0, "44 times"), (1000.0, 30.0, "30 times"), (0.01, 1.0, "0.01")],
+)
+def test_a_steady_current_that_a_fault_makes_swing_is_of_the_same_unit(swings, level, refused):
+    """A measured motor's drag asked for 2.9 times its current, 44 times its deviation from it."""
+    own = SimpleNamespace(axis=1, size={"current": swings}, steps=(0.0, 0.1), level=5 * level)
+    usual = SimpleNamespace(size={(1, "current"): 1.0}, steps={1: (0.0, 0.1)}, level={1: 5.0})
+    told = _other_unit(own, usual)
+    assert (refused in told) if refused else told is None
 
 
 def test_a_speed_in_turns_a_minute_is_of_another_unit():
@@ -167,9 +179,9 @@ def test_a_dead_sensor_is_no_joint_that_stands(current, position, said):
 def test_degrees_for_radians_are_no_joint_that_stands_still(current, position, said):
     """Of a program logged in degrees no motion is found: it would be too fast for any robot."""
     sizes = {"current": current, "position": position}
-    own = SimpleNamespace(axis=2, size=sizes, steps=(0.0, 0.01))
+    own = SimpleNamespace(axis=2, size=sizes, steps=(0.0, 0.01), level=None)
     usual = SimpleNamespace(
-        size={(2, "current"): 1.0, (2, "position"): 0.5}, steps={2: (0.0, 0.01)}
+        size={(2, "current"): 1.0, (2, "position"): 0.5}, steps={2: (0.0, 0.01)}, level={2: 0.0}
     )
     told = _far_too_large(own, usual)
     assert (told is None) == (said is None)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import IdentifyConfig
@@ -17,6 +18,7 @@ from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.stages.chain.cycles.axis import Axis, axes_of, span_at, usable_segments, values_of
 from opamc_cli.stages.chain.cycles.leads import with_leads
+from opamc_cli.stages.chain.segments.rows import EDGE_S
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.recordings.envelope import read_envelope
 from opamc_cli.storage.schemas.tables import MOTIONS
@@ -63,10 +65,7 @@ def given_references(
     sources = {source.name: source for source in read_sources(path, moved_to)}
     rows = table.filter(table.column("reference"))
     if rows.num_rows == 0:
-        msg = (
-            f"{path}: holds no reference cycle: no motion repeats; record at least two cycles of "
-            "the baseline, or set identify.segments_per_cycle"
-        )
+        msg = f"{path}: holds no reference cycle: {why_untold(table)}"
         raise NotEnoughDataError(msg)
     held = set(zip(rows["run"].to_pylist(), rows["axis"].to_pylist(), strict=True))
     own = [part for part in axes_of(table, sources) if (part.source.name, part.axis) in held]
@@ -87,6 +86,30 @@ def given_references(
             bool(values_of(part.rows, "edge")[which].any()),
         )
     return references
+
+
+def why_untold(motions: pa.Table) -> str:
+    """Say why no motion of a motion table is told, and what to do."""
+    if not motions.num_rows:
+        return "no motion was found; see `opamc segment`"
+    edge, start, stop, rate = (
+        np.asarray(motions[name]) for name in ("edge", "start", "stop", "sampling_rate_hz")
+    )
+    if not edge.all():
+        return (
+            "no motion repeats; record at least two cycles of the baseline, or set "
+            "identify.segments_per_cycle"
+        )
+    lasting = (stop - start) / rate
+    least, most = float(lasting.min()), float(lasting.max())
+    unlike = (
+        f", and they last {least:.2g} to {most:.2g} s" if most > least * (1 + SAME_DURATION) else ""
+    )
+    return (
+        f"no motion repeats: each begins or ends within {EDGE_S:g} s of its recording's edge, "
+        f"which may have cut it{unlike}; record at least two cycles, or more rest before and after"
+        + (", or leave out those of another speed or load" if unlike else "")
+    )
 
 
 def own_references(

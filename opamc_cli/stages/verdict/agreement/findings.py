@@ -280,6 +280,9 @@ def _other_unit(own: Measured, reference: Reference) -> str | None:
         if usual is None or (usual == 0 and size == 0):
             continue
         times = size / usual if usual > 0 else math.inf
+        if kind == "current" and own.level and reference.level[own.axis] and usual > 0:
+            # a unit scales the mean, too, about which that of a joint that runs on hardly swings
+            times = min(times, max(1.0, own.level / reference.level[own.axis]))
         largest = SCALED if kind != "current" or _scaled(own, reference, times) else LARGEST_RATIO
         if not 1 / largest <= times <= largest:
             if size == 0:

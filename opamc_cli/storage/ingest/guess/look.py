@@ -80,10 +80,21 @@ def look_at(path: Path, encoding: str | None = None) -> Look:
             meant = [each for each in meant if rows[each.source] == n]
             choices = choose(meant)
             break
+        values: dict[Name | tuple[Name, int], Array] = {}
+        empty: set[Name] = set()
+        while True:
+            chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
+            values |= {key_of(c): values_of(source, c) for c in chosen if key_of(c) not in values}
+            holding = _empty(choices, values)
+            if not holding:
+                break
+            empty |= holding
+            meant = [each for each in meant if each.source not in empty]
+            choices = choose(meant)
         time = time_channel(meant)
         program = _program(source)
-        chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
-        values = {key_of(c): values_of(source, c) for c in [*chosen, *([time] if time else [])]}
+        if time:
+            values[key_of(time)] = values_of(source, time)
     if time and counts_time(time.pattern) and time_guess(time, values[key_of(time)]) is None:
         time = None
     logged = choices.get("temperature", Choice("temperature", {}, ()))
@@ -106,6 +117,9 @@ def look_at(path: Path, encoding: str | None = None) -> Look:
     for name in (each.name for each in listed if each.name not in used):
         if isinstance(name, int):
             continue
+        if name in empty:
+            unused.append(f"{name} (empty)")
+            continue
         pattern = re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name)
         # one of a family that is used is named itself
         unused.append(name if pattern in patterns else pattern)
@@ -116,6 +130,19 @@ def look_at(path: Path, encoding: str | None = None) -> Look:
     rates = [each.rate for each in listed if each.name in used]
     rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None
     return Look(path, layout, choices, time, values, rest, repeated, rate, unsigned, program)
+
+
+def _empty(choices: dict[str, Choice], values: dict[Name | tuple[Name, int], Array]) -> set[Name]:
+    """Return what was chosen of kinds that hold no number: loggers keep columns for what they lack.
+
+    Where one axis of several is empty, it is that joint's loss, and no reason for another family.
+    """
+    found: set[Name] = set()
+    for choice in choices.values():
+        own = choice.by_axis.values()
+        if not any(np.isfinite(values[key_of(channel)]).any() for channel in own):
+            found |= {channel.source for channel in own}
+    return found
 
 
 def _program(source: Source) -> str | None:

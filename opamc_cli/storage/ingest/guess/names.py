@@ -59,8 +59,8 @@ TOLD_BY_UNIT = ("current", *LOGGED)
 """Quantities that a unit tells where the name does not; a second may be of anything."""
 
 
-UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$|(?<=[^\W_])_(deg|rad|rpm)$")
-"""Such as `Current J1 [mA]`, `time (ms)`, `J1_act_deg`."""
+UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$|(?:(?<=[^\W_])_|^(?=rpm$))(deg|rad|rpm)$")
+"""Such as `Current J1 [mA]`, `time (ms)`, `J1_act_deg`, `rpm`."""
 
 COUNTED = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*[*x·]?\s*(\D\S*)")
 """Such as `0.1 deg`."""

@@ -49,6 +49,25 @@ def test_a_column_of_texts_that_names_the_program(tmp_path):
     assert f"  program: {{source: prog}}  # {why}" in lines_of(path)[1]
 
 
+def test_columns_that_a_logger_keeps_for_what_it_lacks_are_not_taken(tmp_path):
+    """Of a measured bench an empty phase and an empty speed were, beside those with numbers."""
+    path = tmp_path / "bench.csv"
+    head = "speed_setpoint_rpm,t_ms,rpm,i_dc_a,i_u_a,i_v_a,i_w_a,modbus_rpm\n"
+    rows = [f"900,{10 * k},{900 + k % 7},{0.2 + 0.01 * (k % 5):.2f},,,,\n" for k in range(N)]
+    path.write_text(head + "".join(rows))
+    found = "\n".join(lines_of(path)[0])
+    assert "axis1_current: {source: i_dc_a, unit: A}" in found
+    assert "axis1_velocity: {source: rpm, unit: rpm} # as the file says" in found
+    assert "i_u_a (empty), i_v_a (empty), i_w_a (empty)" in found
+
+
+def test_one_joint_s_empty_column_stays_in_its_family(tmp_path):
+    path = tmp_path / "arm.csv"
+    rows = [f"{t:g},{s:g},,{s:g}\n" for t, s in zip(T, SPEED, strict=True)]
+    path.write_text("t,cur_1,cur_2,motor_current\n" + "".join(rows))
+    assert "  axis{n}_current: {source: cur_{n}, unit: A}" in guess_map([path])
+
+
 def test_a_table_of_everything(tmp_path):
     columns = {
         "t": T,

@@ -186,6 +186,24 @@ def test_a_late_stamp_is_no_missing_sample():
     assert account.jitter_s == pytest.approx(0.6)
 
 
+@pytest.mark.parametrize("rate", [418.0, 440.0, 310.0])
+def test_a_period_between_two_whole_milliseconds_is_not_the_commoner_step(rate):
+    """A measured 418 Hz log in milliseconds was put on 473 Hz, its longer steps lost samples."""
+    late = 1e-3 * (np.arange(500) % 42 == 41)  # a clock of 1.024 ms, as an Arduino's
+    times = np.round(np.delete(np.arange(500) / rate + late, [100, 300]), 3)
+    account = clock_of(times).account
+    assert not account.even
+    assert account.measured_rate_hz == pytest.approx(rate, rel=0.005)
+    assert account.n_bridged + account.n_gaps == 2
+
+
+@pytest.mark.parametrize("lost", [0.05, 0.25])
+def test_samples_lost_of_a_clock_that_counts_its_samples_are_no_rounding(lost):
+    kept = np.random.default_rng(6).random(1000) >= lost
+    account = clock_of(np.flatnonzero(kept).astype(float)).account
+    assert account.measured_rate_hz == pytest.approx(1.0)
+
+
 def test_the_step_that_stamps_are_rounded_to():
     times = np.arange(300) / 2048
     for digits in range(1, 9):
