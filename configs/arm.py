@@ -50,7 +50,7 @@ MOST_LEFT = 0.3
 """Of the current's deviation, in blocks left out, by half of the joints: 20 simulated programs of a
 minute leave 0.006 to 0.07, two measured ones of two seconds more than all."""
 RIDGE, LONG = 1e-7, 0.02
-"""Of links' parameters, in the current's deviation, and of a way from axis to axis, in m."""
+"""Of links' parameters, in the current's deviation; of ways from axis to axis (m), zeros (rad)."""
 
 
 class Arm(Effect):
@@ -190,8 +190,8 @@ class Finder:
     What an axis is parallel to at zero is one of six letters, and weight alone nearly tells it: the
     sum of a chain's ways and first moments is linear whatever its lengths are. So letters are
     exchanged one by one, without lengths, as long as blocks left out are predicted better, then
-    lengths are fitted beside the links' parameters, and both once more. A joint with a fault
-    misleads nobody: its logarithm is one of many.
+    lengths and what is off the zeros are fitted beside the links' parameters, and both once more. A
+    joint with a fault misleads nobody: its logarithm is one of many.
     """
 
     def __init__(self, motion: Floats, current: Floats) -> None:
@@ -209,8 +209,8 @@ class Finder:
                 self.joints[joint] = moves, own, (y - y.mean()) / y.std()
 
     def found(self) -> tuple[str, Floats]:
-        """Return the axes' letters and the ways from each to the next, (joints, 3) in m."""
-        none = np.zeros((self.motion.shape[1], 3))
+        """Return the axes' letters, and ways from each to the next and its zero, (joints, 4)."""
+        none = np.zeros((self.motion.shape[1], 4))
         starts = {start[: len(none)] for start in STARTS}
         best: list[tuple[float, str, Floats]] = []
         for word in sorted(starts, key=lambda one: self.score(one, none))[:2]:
@@ -246,11 +246,11 @@ class Finder:
             letters = best
 
     def fitted(self, letters: str, ways: Floats) -> Floats:
-        """Fit the ways, beside links' parameters that are best for each."""
+        """Fit ways and zeros, beside links' parameters that are best for each."""
         sizes = np.sqrt(self.left(letters, ways))
 
         def left(free: Floats) -> Floats:
-            designs = self._designs(letters, np.vstack([np.zeros(3), free.reshape(-1, 3)]))
+            designs = self._designs(letters, np.vstack([np.zeros(4), free.reshape(-1, 4)]))
             found = [LONG * free]
             for x, size, (_, _, y) in zip(designs, sizes, self.joints.values(), strict=True):
                 held = np.linalg.solve(x.T @ x + RIDGE * len(y) * np.eye(x.shape[1]), x.T @ y)
@@ -258,7 +258,7 @@ class Finder:
             return np.concatenate(found)
 
         free = least_squares(left, ways[1:].ravel(), max_nfev=8, x_scale=0.2).x
-        return np.vstack([np.zeros(3), free.reshape(-1, 3)])
+        return np.vstack([np.zeros(4), free.reshape(-1, 4)])
 
     def _designs(self, letters: str, ways: Floats) -> list[Floats]:
         joints = _as_joints(letters, ways)
@@ -272,9 +272,8 @@ class Finder:
 
 
 def _as_joints(letters: str, ways: Floats) -> Any:
-    return [
-        (tuple(way), (0.0, 0.0, 0.0), WAYS[one]) for one, way in zip(letters, ways, strict=True)
-    ]
+    axes = [WAYS[one] for one in letters]
+    return [(tuple(one[:3]), tuple(one[3] * to), to) for to, one in zip(axes, ways, strict=True)]
 
 
 def _friction(q: Floats, v: Floats, a: Floats) -> Floats:
@@ -338,10 +337,10 @@ def main(paths: list[str]) -> None:
             f"{paths[0]}: does not tell where the joints are (best, {letters}, leaves of the "
             f"current of axis {told}); log a longer program in which all axes move, or write them"
         )
-    rows = [
-        f"    (({x:.3f}, {y:.3f}, {z:.3f}), (0, 0, 0), ({a:.0f}, {b:.0f}, {c:.0f})),\n"
-        for (x, y, z), (a, b, c) in zip(ways, (WAYS[one] for one in letters), strict=True)
-    ]
+    rows = []
+    for way, turned, axis in _as_joints(letters, ways):
+        xyz, rpy = (", ".join(f"{one + 0.0:.3f}" for one in some) for some in (way, turned))
+        rows.append(f"    (({xyz}), ({rpy}), ({', '.join(f'{one:.0f}' for one in axis)})),\n")
     here = Path(__file__)
     text = re.sub(r"(?ms)^JOINTS = \(.*?^\)\n", f"JOINTS = (\n{''.join(rows)})\n", here.read_text())
     here.write_text(text)

@@ -177,7 +177,8 @@ def test_an_arm_is_found_from_all_currents(arm, tmp_path):
     current = np.array(asked_of) + 0.5 * a + np.sign(v) + 0.5 * v
     current[1] += 3 * np.sin(20 * q[1])  # A fault in one of them.
     current += 0.02 * rng.normal(size=current.shape)
-    columns = {f"axis{k + 1}_position": q[k] for k in range(4)}
+    motion[0, 2] += 0.06  # An encoder whose zero is off.
+    columns = {f"axis{k + 1}_position": motion[0, k] for k in range(4)}
     table = pa.table(columns | {f"axis{k + 1}_current": current[k] for k in range(4)})
     record = json.dumps({"sampling_rate_hz": rate}).encode()
     pq.write_table(table.replace_schema_metadata({b"opamc": record}), tmp_path / "run.parquet")
