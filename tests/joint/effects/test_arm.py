@@ -202,3 +202,20 @@ def test_an_arm_is_not_found_without_its_currents(arm, tmp_path):
     assert "currents of all axes" in told.stderr
     assert "Traceback" not in told.stderr
     assert (tmp_path / "arm.py").read_text() == ARM.read_text()
+
+
+def test_an_arm_is_not_found_where_currents_do_not_tell(tmp_path):
+    rng = np.random.default_rng(8)
+    t = np.arange(2000) / 100.0
+    q = [np.sin(speed * t) for speed in (0.7, 1.1, 1.7)]
+    columns = {f"axis{k + 1}_position": q[k] for k in range(3)}
+    columns |= {f"axis{k + 1}_current": rng.normal(size=t.size) for k in range(3)}
+    record = json.dumps({"sampling_rate_hz": 100.0}).encode()
+    table = pa.table(columns).replace_schema_metadata({b"opamc": record})
+    pq.write_table(table, tmp_path / "run.parquet")
+    (tmp_path / "arm.py").write_text(ARM.read_text())
+    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
+    told = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert told.returncode == 1
+    assert "does not tell where the joints are" in told.stderr
+    assert (tmp_path / "arm.py").read_text() == ARM.read_text()
