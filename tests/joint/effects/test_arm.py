@@ -2,6 +2,8 @@
 
 import importlib.util
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,11 @@ ARM = Path(__file__).parents[3] / "configs" / "arm.py"
 
 @pytest.fixture
 def arm():
-    spec = importlib.util.spec_from_file_location("arm", ARM)
+    return loaded(ARM)
+
+
+def loaded(path):
+    spec = importlib.util.spec_from_file_location("arm", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -146,3 +152,70 @@ def test_an_arm_asks_for_all_of_its_axes(arm, tmp_path, capsys):
     recorded(arm, tmp_path, "", axes=range(1, 6))
     assert close(tmp_path) == 2
     assert "those of axes 1, 2, 3, 5: log all" in capsys.readouterr().err
+
+
+def test_an_arm_is_found_from_all_currents(arm, tmp_path):
+    # An elbow beyond a shoulder's offset, and a wrist that turns the other way about the forearm.
+    arm.JOINTS = tuple(
+        (way, (0.0, 0.0, 0.0), axis)
+        for way, axis in (
+            ((0.0, 0.0, 0.3), (0, 0, 1)),
+            ((0.15, 0.0, 0.2), (0, 1, 0)),
+            ((0.0, 0.0, 0.6), (0, 1, 0)),
+            ((0.35, 0.0, 0.1), (-1, 0, 0)),
+        )
+    )
+    rate, rng = 100.0, np.random.default_rng(5)
+    t = np.arange(int(40 * rate)) / rate
+    waves = rng.uniform(0.2, 3.0, (4, 5)), rng.uniform(0, 6, (4, 5)), rng.uniform(0.1, 0.4, (4, 5))
+    speed, phase, size = (one[:, :, None] for one in waves)
+    q = (size * np.sin(speed * t + phase)).sum(1)
+    v = (size * speed * np.cos(speed * t + phase)).sum(1)
+    a = -(size * speed**2 * np.sin(speed * t + phase)).sum(1)
+    motion, own = np.array([q, v, a]), links(6)
+    asked_of = [arm.torques(motion, k) @ own[k:4].ravel() for k in range(4)]
+    current = np.array(asked_of) + 0.5 * a + np.sign(v) + 0.5 * v
+    current[1] += 3 * np.sin(20 * q[1])  # A fault in one of them.
+    current += 0.02 * rng.normal(size=current.shape)
+    motion[0, 2] += 0.06  # An encoder whose zero is off.
+    columns = {f"axis{k + 1}_position": motion[0, k] for k in range(4)}
+    table = pa.table(columns | {f"axis{k + 1}_current": current[k] for k in range(4)})
+    record = json.dumps({"sampling_rate_hz": rate}).encode()
+    pq.write_table(table.replace_schema_metadata({b"opamc": record}), tmp_path / "run.parquet")
+    (tmp_path / "arm.py").write_text(ARM.read_text())
+    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
+    told = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert "axis 1 " in told.stdout
+    found = loaded(tmp_path / "arm.py")
+    for joint, torque in enumerate(asked_of):
+        columns = found.torques(motion, joint)
+        columns = np.hstack([columns, a[joint][:, None]])  # Its rotor is beside.
+        left = torque - columns @ np.linalg.lstsq(columns, torque, rcond=1e-10)[0]
+        assert np.std(left) < 0.02 * np.std(torque)
+
+
+def test_an_arm_is_not_found_without_its_currents(arm, tmp_path):
+    recorded(arm, tmp_path, "quadratic_friction")
+    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
+    told = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert told.returncode != 0
+    assert "currents of all axes" in told.stderr
+    assert "Traceback" not in told.stderr
+    assert (tmp_path / "arm.py").read_text() == ARM.read_text()
+
+
+def test_an_arm_is_not_found_where_currents_do_not_tell(tmp_path):
+    rng = np.random.default_rng(8)
+    t = np.arange(2000) / 100.0
+    q = [np.sin(speed * t) for speed in (0.7, 1.1, 1.7)]
+    columns = {f"axis{k + 1}_position": q[k] for k in range(3)}
+    columns |= {f"axis{k + 1}_current": rng.normal(size=t.size) for k in range(3)}
+    record = json.dumps({"sampling_rate_hz": 100.0}).encode()
+    table = pa.table(columns).replace_schema_metadata({b"opamc": record})
+    pq.write_table(table, tmp_path / "run.parquet")
+    (tmp_path / "arm.py").write_text(ARM.read_text())
+    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
+    told = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert told.returncode == 1
+    assert "does not tell where the joints are" in told.stderr
+    assert (tmp_path / "arm.py").read_text() == ARM.read_text()
