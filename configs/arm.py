@@ -1,9 +1,9 @@
 """What the links of an arm ask of one of its joints, from where its joints are.
 
 For `opamc model` where all axes of an arm move at once. Write your robot's joints into a copy of
-this file, or have them found from runs with all positions and currents, `python arm.py RUN ...`,
-and in `model.yaml`: `library: [arm.py]`, `effects: [arm, inertia, offset, coulomb, viscous]` and
-`without: [coupling]`, which is what is searched where nobody tells the arm.
+this file, or have them found from runs with all positions and currents: `python arm.py RUN ...`, by
+the Python that opamc is installed in. In `model.yaml`: `library: [arm.py]`, `effects: [arm,
+inertia, offset, coulomb, viscous]` and `without: [coupling]`, which is searched without an arm.
 """
 
 import re
@@ -22,16 +22,13 @@ from opamc_cli.joint.motion.track import Floats, Ints, Track
 from opamc_cli.storage.runs.run import Run
 
 JOINTS = (
-    ((0.0, 0.0, 0.1273), (0.0, 0.0, 0.0), (0, 0, 1)),
-    ((0.0, 0.220941, 0.0), (0.0, np.pi / 2, 0.0), (0, 1, 0)),
-    ((0.0, -0.1719, 0.612), (0.0, 0.0, 0.0), (0, 1, 0)),
-    ((0.0, 0.0, 0.5723), (0.0, np.pi / 2, 0.0), (0, 1, 0)),
-    ((0.0, 0.1149, 0.0), (0.0, 0.0, 0.0), (0, 0, 1)),
-    ((0.0, 0.0, 0.1157), (0.0, 0.0, 0.0), (0, 1, 0)),
+    # Of a UR10 ((0, 0, 0.1273), (0, 0, 0), (0, 0, 1)), ((0, 0.2209, 0), (0, 1.5708, 0), (0, 1, 0)),
+    # ((0, -0.1719, 0.612), (0, 0, 0), (0, 1, 0)), ((0, 0, 0.5723), (0, 1.5708, 0), (0, 1, 0)),
+    # ((0, 0.1149, 0), (0, 0, 0), (0, 0, 1)), ((0, 0, 0.1157), (0, 0, 0), (0, 1, 0)),
 )
 """Axis 1, 2, ...: as in a robot's URDF, `xyz` in m and `rpy` in rad of the joint's `origin`, and
-its `axis`. These are a UR10's. An axis that counts the other way has its `axis` negated, one whose
-zero is elsewhere is turned by its `rpy`. Tool and payload belong to the last link."""
+its `axis`. An axis that counts the other way has its `axis` negated, one whose zero is elsewhere is
+turned by its `rpy`. Tool and payload belong to the last link."""
 
 UP = (0.0, 0.0, 1.0)
 """Upwards in the base's frame: of an arm that hangs from the ceiling (0, 0, -1)."""
@@ -92,6 +89,9 @@ class Payload(PayloadChange):
 def _asked(track: Track, rows: Ints, some: slice) -> Floats:
     """Independent torques of the joint by some of the links' parameters, at some samples."""
     axes = range(1, len(JOINTS) + 1)
+    if not JOINTS:
+        msg = "effect 'arm' knows no joints yet: have them found, `python arm.py RUN.parquet ...`"
+        raise ConfigError(msg + ", or write them into arm.py")
     own = [axis for axis in axes if axis not in track.other_axes]
     if track.others is None or len(own) != 1:
         msg = (

@@ -14,11 +14,21 @@ import pytest
 from opamc_cli.__main__ import main
 
 ARM = Path(__file__).parents[3] / "configs" / "arm.py"
+UR10 = (
+    ((0.0, 0.0, 0.1273), (0.0, 0.0, 0.0), (0, 0, 1)),
+    ((0.0, 0.220941, 0.0), (0.0, np.pi / 2, 0.0), (0, 1, 0)),
+    ((0.0, -0.1719, 0.612), (0.0, 0.0, 0.0), (0, 1, 0)),
+    ((0.0, 0.0, 0.5723), (0.0, np.pi / 2, 0.0), (0, 1, 0)),
+    ((0.0, 0.1149, 0.0), (0.0, 0.0, 0.0), (0, 0, 1)),
+    ((0.0, 0.0, 0.1157), (0.0, 0.0, 0.0), (0, 1, 0)),
+)
 
 
 @pytest.fixture
 def arm():
-    return loaded(ARM)
+    module = loaded(ARM)
+    module.JOINTS = UR10
+    return module
 
 
 def loaded(path):
@@ -111,7 +121,7 @@ def recorded(arm, folder, lacks, axes=range(1, 7)):
     table = pa.table({"axis4_current": current, **columns})
     record = json.dumps({"sampling_rate_hz": rate}).encode()
     pq.write_table(table.replace_schema_metadata({b"opamc": record}), folder / "run.parquet")
-    (folder / "arm.py").write_text(ARM.read_text())
+    (folder / "arm.py").write_text(f"{ARM.read_text()}\n\nJOINTS = {UR10}\n")
     (folder / "model.yaml").write_text(
         "library: [arm.py]\neffects: [arm, inertia, offset, coulomb, viscous]\n"
         "without: [coupling]\n"
@@ -146,6 +156,13 @@ def test_beside_a_declared_arm_what_its_joint_lacks_is_named(arm, tmp_path, lack
         assert ended("model", *applied, *closed) == 0
         (one,) = json.loads((tmp_path / "on" / "evaluation.json").read_text())["axes"]
         assert one["rmse_a"] < 1.1 * noise
+
+
+def test_an_arm_that_nobody_has_written_is_asked_for(arm, tmp_path, capsys):
+    recorded(arm, tmp_path, "")
+    (tmp_path / "arm.py").write_text(ARM.read_text())
+    assert close(tmp_path) == 2
+    assert "knows no joints yet" in capsys.readouterr().err
 
 
 def test_an_arm_asks_for_all_of_its_axes(arm, tmp_path, capsys):
@@ -196,6 +213,7 @@ def test_an_arm_is_found_from_all_currents(arm, tmp_path):
 
 def test_an_arm_is_not_found_without_its_currents(arm, tmp_path):
     recorded(arm, tmp_path, "quadratic_friction")
+    (tmp_path / "arm.py").write_text(ARM.read_text())
     words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
     told = subprocess.run(words, capture_output=True, text=True, check=False)
     assert told.returncode != 0
