@@ -115,24 +115,6 @@ def test_what_nothing_explains_far_beyond_the_noise_is_said_also_if_quiet(slow_a
     assert code == (5 if said else 0)
 
 
-def test_a_closed_loop_that_leaves_far_more_than_noise_ends_as_nothing_missing_does(
-    folder, capsys, monkeypatch
-):
-    assert close(folder, "--quiet", "--axis", "1") == 0
-    capsys.readouterr()
-    true = stage.close_loop
-
-    def smooth(*given, **more):
-        loop = true(*given, **more)
-        return replace(loop, noise_a=loop.rmse_after_a / 9.6)
-
-    monkeypatch.setattr(stage, "close_loop", smooth)
-    assert close(folder, "--quiet", "--axis", "1") == 5
-    assert "10 times the noise between samples" in capsys.readouterr().err
-    (entry,) = json.loads((folder / "out" / "loop.json").read_text())["axes"]
-    assert entry["verdict"] == "closed"
-
-
 @pytest.mark.parametrize("hidden", ["ripple", "quadratic_friction"])
 def test_names_of_a_place_that_is_a_guess_are_doubted(hidden, tmp_path, capsys, monkeypatch):
     made = simulate(3, (hidden,), 15.0, rate=1000.0, cycles=3)

@@ -134,11 +134,11 @@ def close(
     for entry in outcome.results:
         if quiet and (entry["fails"] or entry["unconfirmed"] or far_from_noise(entry)):
             output.failure(headline(entry))
-    # What fails on the sealed data tells nothing for certain; that no more is missing is not known
-    # where the sealed data, or nothing here, tell of what is left.
+    # What fails on the sealed data tells nothing for certain. Nothing may be missing, or something
+    # of which the sealed data, or nothing here, tell nothing.
     nothing = [entry for entry in outcome.results if entry["verdict"] == "nothing-missing"]
-    unknown = any(entry["unconfirmed"] for entry in nothing)
-    unknown |= any(entry["fails"] or far_from_noise(entry) for entry in outcome.results)
+    unknown = any(entry["unconfirmed"] or far_from_noise(entry) for entry in nothing)
+    unknown |= any(entry["fails"] for entry in outcome.results)
     _end(outcome, output, ExitCode.NOT_ENOUGH_DATA if unknown else ExitCode.DONE)
 
 
