@@ -136,14 +136,6 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
     left = squares / compared.dataset.fine.parts.counts
     fast = float(np.median(left[late]) - np.median(left[~late]))
     periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)
-    # Where less is left in all, faint harmonics grow by themselves, as in the cold, and a share
-    # would be one of nothing that the decision saw.
-    periodic = [
-        one
-        for one in periodic
-        if fast > 0 or _doubled(one) or (one.effect == "ripple" and not one.faint)
-    ]
-
     # What each slow cause takes from the target's distance to the baseline's mean, in their order.
     apart = [left_by(compared, population, one) for one in (None, *(one.shift for one in slow))]
     rests = np.minimum.accumulate([float(np.mean(one[late])) for one in apart])
@@ -199,19 +191,16 @@ def _of_lines(periodic: list[Reading], whole: float, loaded: bool, library: Libr
     named = []
     for one in periodic:
         if one.effect in library:
-            grown = one.evidence["power_ratio"] >= CLEAR_GROWTH
-            clear, share = one.kind == "mesh" and grown, one.power / whole
+            ratio, share = one.evidence["power_ratio"], one.power / whole
+            grown, doubled = ratio >= CLEAR_GROWTH, one.kind in OF_THE_GEAR and ratio >= GROWTH
+            clear = one.kind == "mesh" and grown
             enough = share >= FAULT_SHARE and (grown or not loaded)
-            serious = clear or enough or (_doubled(one) and not loaded)
+            serious = clear or enough or (doubled and not loaded)
             named.append(_weighed(one, share, library, serious, clear))
     if not named:
         return []
     most = ("share", "serious", "clear")
     return [replace(named[0], **{one: max(getattr(n, one) for n in named) for one in most})]
-
-
-def _doubled(ripple: Reading) -> bool:
-    return ripple.kind in OF_THE_GEAR and ripple.evidence["power_ratio"] >= GROWTH
 
 
 def _weighed(

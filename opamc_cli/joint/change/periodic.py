@@ -11,7 +11,7 @@ from opamc_cli.joint.change.lines import (
     order_spectra,
     power_at,
 )
-from opamc_cli.joint.change.reading import Reading, read_frequency, read_line, read_lines
+from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
 from opamc_cli.joint.change.units import Compared
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import standing_views
@@ -35,10 +35,6 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
     faint = _read(compared, residual, between, whole, order_spectra(compared, residual, True))
     if faint is not None and faint.kind in OF_THE_GEAR:
         return [faint] if plain is None else [faint, plain]
-    if plain is not None and plain.kind == "mesh" and compared.track.angle_kind == "electrical":
-        # One line is at the mesh's order for some number of pole pairs: of lost stiffness, too.
-        other = read_line(plain.lines[0], compared.track, plain.evidence["order_resolution"])
-        return [replace(other, power=plain.power), plain]
     return [] if plain is None else [plain]
 
 
@@ -59,7 +55,7 @@ def _read(
     hum = _picked_up(timed, residual, lines[0], between)
     if hum is not None:
         return hum
-    reading = replace(read_lines(lines, compared.track, spectra.resolution), faint=spectra.tapered)
+    reading = read_lines(lines, compared.track, spectra.resolution)
     if reading.kind == "unknown":
         # An order that means nothing may be a frequency: hum, or a structure that rings.
         clock = order_spectra(timed, residual)

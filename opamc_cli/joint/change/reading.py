@@ -91,8 +91,6 @@ class Reading(Cause):
     "mains"."""
     power: float = 0.0
     """Mean square that it holds more in the target than in the baseline, A^2."""
-    faint: bool = False
-    """Whether it was seen in tapered strokes, which show what whole ones hide."""
 
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:

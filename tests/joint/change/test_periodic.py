@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from sessions import units_of, with_track
 
-from opamc_cli.joint.change import periodic
 from opamc_cli.joint.change.lines import grown_lines, order_spectra
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.motion.track import Joint
@@ -147,13 +146,13 @@ def faint(units, order):
 
 def test_a_tooth_may_be_as_faint_as_tapered_strokes_show_it(units):
     readings = faint(units, 4 * (RATIO + 1) / RATIO)
-    assert [(one.effect, one.kind, one.faint) for one in readings] == [("ripple", "mesh", True)]
+    assert [(one.effect, one.kind) for one in readings] == [("ripple", "mesh")]
 
 
 def test_what_whole_strokes_show_is_read_from_both(units):
     wave = lambda track: np.cos(2 * (RATIO + 1) / RATIO * track.machine_angle_rad)  # noqa: E731
     readings = find_periodic(units, residual(units, wave))
-    assert [(one.kind, one.faint) for one in readings] == [("mesh", True), ("mesh", False)]
+    assert [one.kind for one in readings] == ["mesh", "mesh"]
     assert readings[0].evidence["power_ratio"] > 10
 
 
@@ -171,25 +170,8 @@ def test_what_excuses_a_joint_has_to_stand_out_of_whole_strokes(units, poles):
     alone = find_periodic(
         phases, residual(phases, lambda track: np.cos(poles * track.machine_angle_rad))
     )
-    assert [(one.effect, one.faint) for one in alone] == [("sensor_offset", False)]
+    assert [one.effect for one in alone] == ["sensor_offset"]
 
 
 def test_where_whole_strokes_show_nothing_a_faint_line_without_a_meaning_is_none(units):
     assert faint(units, 6.63) == []
-
-
-def test_over_the_electrical_angle_a_line_alone_is_not_named_the_mesh_s(units, monkeypatch):
-    """Some number of pole pairs always fits one line: a joint's lost stiffness was called teeth."""
-    angle = POLES * units.track.machine_angle_rad
-    track = {"machine_angle_rad": angle, "angle_kind": "electrical", "joint": Joint()}
-    electrical = with_track(units, **track)
-    wave = lambda track: np.cos(2 * (RATIO + 1) / RATIO / POLES * track.machine_angle_rad)  # noqa: E731
-
-    def seen(*given):
-        return None if given[-1].tapered else read(*given)
-
-    read = periodic._read
-    monkeypatch.setattr(periodic, "_read", seen)
-    first, second = find_periodic(electrical, residual(electrical, wave))
-    assert (first.kind, second.kind) == ("unknown", "mesh")
-    assert first.power == second.power
