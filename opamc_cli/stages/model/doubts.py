@@ -31,8 +31,8 @@ ALONE = (
 
 ONE_PROGRAM = (
     "axis {}: which of the other joints load it, and what of that is an effect of its own, one "
-    "program does not tell for certain; declare the arm (configs/arm.py), or close it on several "
-    "programs at once"
+    "program does not tell for certain; declare the arm (configs/arm.py finds its joints), or "
+    "close it on several programs at once"
 )
 
 OF_THE_PLACE = {
