@@ -10,7 +10,14 @@ from opamc_cli.joint.change.lines import fast_residuals, order_spectra
 from opamc_cli.joint.change.periodic import OF_THE_GEAR, find_periodic
 from opamc_cli.joint.change.reading import Cause, Reading
 from opamc_cli.joint.change.search import SCALE, Grease, find_slow_causes
-from opamc_cli.joint.change.slow import Population, learn, left_by, shift_power, with_model
+from opamc_cli.joint.change.slow import (
+    FRICTION_SPREAD,
+    Population,
+    learn,
+    left_by,
+    shift_power,
+    with_model,
+)
 from opamc_cli.joint.change.units import Compared, Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.fit.model import Term
@@ -91,10 +98,17 @@ def explain_change(
 def friction_change(
     baseline: list[Recording], target: list[Recording], joint: Joint, follow: Follow = follow
 ) -> float | None:
-    """Tell by how much friction differs, of 1; None without three baseline sessions or a model."""
+    """Tell by how much friction differs, of 1; None without three baseline sessions or a model.
+
+    Nor where these differ by more than twice what sessions do: an upright joint's, from phases
+    that do not tell the side of its torque, by 17 %, beside which a healthy sibling's stood out.
+    """
     sides = [read_side(baseline, joint, False, follow), read_side(target, joint, False)]
     laid = _laid_out(sides, False, built_in_library()) if all(sides) and len(sides[0]) > 2 else ""
-    return None if isinstance(laid, str) else Grease.of(laid[0], laid[2]).whole
+    if isinstance(laid, str):
+        return None
+    found = Grease.of(laid[0], laid[2])
+    return found.whole if found.scatter <= 2 * FRICTION_SPREAD else None
 
 
 def _laid_out(

@@ -103,6 +103,8 @@ class Grease:
     """With `dry`: relative changes of dry and of viscous friction."""
     whole: float
     """Of both together, as root mean square at the speeds that occur."""
+    scatter: float
+    """Standard deviation of the baseline's own, of the mean; with two units at least."""
 
     @classmethod
     def of(cls, compared: Compared, population: Population) -> "Grease":
@@ -116,16 +118,20 @@ class Grease:
             difference = float(means[late].mean() - means[~late].mean())
             usual = max(2 * float(np.std(means[~late], ddof=1)), SMALLEST_WARMTH_C)
             warmer = difference if abs(difference) > usual else None
-        mean = own_fit(compared, population.terms)[0][late].mean(axis=0)
+        own = own_fit(compared, population.terms)[0]
+        mean = own[late].mean(axis=0)
         changes = {"coulomb": 0.0, "viscous": 0.0}
         for name, before, after in zip(population.names, population.mean, mean, strict=True):
             if name in changes and before > 0:  # of a negative friction a share says nothing
                 changes[name] = float(after / before - 1)
         rubs = np.array([name in changes for name in population.names])
         products = compared.sums(population.terms).gram.sum(axis=0)
-        before, after = (rubs * one @ products @ (rubs * one) for one in (population.mean, mean))
-        whole = float(np.sqrt(after / before)) - 1 if before > 0 else 0.0
-        return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"], whole)
+        sizes = rubs * np.vstack([population.mean, mean, own[~late]])
+        before, after, *each = np.sqrt(np.einsum("uj,jk,uk->u", sizes, products, sizes))
+        whole = float(after / before) - 1 if before > 0 else 0.0
+        scatter = float(np.std(each, ddof=1) / np.mean(each)) if before > 0 else 0.0
+        wet = changes["viscous"]
+        return cls(degrees is not None, warmer, changes["coulomb"], wet, whole, scatter)
 
     @property
     def mostly_wet(self) -> bool:

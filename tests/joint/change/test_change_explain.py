@@ -9,7 +9,7 @@ from sessions import recordings
 from simulator import simulate
 
 from opamc_cli.joint.change import explain
-from opamc_cli.joint.change.explain import explain_change
+from opamc_cli.joint.change.explain import explain_change, friction_change
 from opamc_cli.joint.change.reading import Reading
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -262,3 +262,24 @@ def test_the_baselines_own_line_tells_the_gear_that_nobody_has(own):
     assert (change.told is not None) == bool(own)
     if own:
         assert change.told.gear_ratio == pytest.approx(101.0, abs=1.0)
+
+
+def test_friction_is_told_by_how_much_unless_healthy_sessions_differ_as_much():
+    count = BASELINE + TARGET
+    made = simulate(1, (), 0.0, cycles=2 * count, rate=250.0)
+    # Most of the friction that there is.
+    own = 5 * np.std(made.current) * np.sign(made.velocity)
+    edges = np.linspace(0, own.size, count + 1).astype(int)
+    for spread, told in ((0.03, pytest.approx(0.37, abs=0.04)), (0.25, None)):
+        moved = [1 + spread * (-1) ** k for k in range(BASELINE)] + [1.4] * TARGET
+        recordings = [
+            Recording(
+                f"s{k}",
+                made.rate_hz,
+                current_a=made.current[start:stop] + moved[k] * own[start:stop],
+                position_rad=made.position[start:stop],
+            )
+            for k, (start, stop) in enumerate(pairwise(edges))
+        ]
+        change = friction_change(recordings[:BASELINE], recordings[BASELINE:], Joint())
+        assert change == told
