@@ -254,9 +254,21 @@ def late_brake(made):
     return way * np.exp(-(number - rested) / made.rate_hz / 0.2)
 
 
+def gain_step(made):
+    """More current for the same torque from two fifths of the recording on."""
+    return (
+        made.current / made.current.std() * (np.arange(made.current.size) > 0.4 * made.current.size)
+    )
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("lacking", "function"), [(dead_zone, "current"), (late_brake, "time_since_rest")]
+    ("lacking", "function"),
+    [
+        (dead_zone, "current"),
+        (late_brake, "time_since_rest"),
+        (gain_step, "time_and_current"),
+    ],
 )
 @pytest.mark.parametrize("seed", [5, 8])
 def test_what_no_effect_describes_is_one_function_of_the_right_thing(lacking, function, seed):

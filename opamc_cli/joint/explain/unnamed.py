@@ -24,6 +24,7 @@ MODIFIED: dict[str, Callable[[Track], Sequence[Floats]]] = {
     "speed": lambda t: [t.velocity],
     "friction": lambda t: [t.direction, t.velocity],
     "sign": lambda t: [np.sign(t.model_a)],
+    "current": lambda t: [t.model_a],
     "load": lambda t: [np.sin(t.position_rad), np.cos(t.position_rad), t.acceleration],
 }
 """What a function may change."""
@@ -46,7 +47,6 @@ class Smooth(Effect):
         covariate: Covariate,
         modified: str,
         needs: tuple[str, ...] = ("position",),
-        constant: bool = True,
         such_as: str = "",
     ) -> None:
         self.name = f"unnamed_{name}"
@@ -56,11 +56,12 @@ class Smooth(Effect):
         such = f": {such_as}" if such_as else ""
         self.meaning = f"a function of {told}{such}; no effect of the library has its form"
         self.changes_in_time = bool({"returns", "revisits", "temperature"} & {*needs})
-        self.from_motion = domain != "load" or self.changes_in_time
+        self.from_motion = domain != "load" or modified == "load"
         self._told = told
         self._covariate = covariate
         self._modified = MODIFIED[modified]
-        self._first = 0 if constant else 1
+        # The model holds a multiple of itself and of the acceleration already.
+        self._first = int(modified == "current" or domain == "acceleration")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """From a bend to sixteen half waves."""
@@ -180,6 +181,8 @@ def time_since_rest(track: Track) -> Floats:
 LATE = "a brake that opens late, or friction after a rest"
 DRIVE = "a drive's dead zone, or less torque from each ampere of a large current"
 POLARITY = "another gain of one polarity"
+GAIN = "a gain that changes"
+TIME = "position", "revisits"
 WARM = "position", "temperature"
 SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed", "velocity", lambda t: np.abs(t.velocity), "direction"),
@@ -192,9 +195,10 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("time_since_rest", "time", time_since_rest, "direction", such_as=LATE),
     Smooth("current", "load", lambda t: np.abs(t.model_a), "sign", such_as=DRIVE),
     Smooth("current_size", "load", lambda t: np.abs(t.model_a), "one", such_as=POLARITY),
-    Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one", constant=False),
-    Smooth("time", "time", lambda t: t.time_s, "one", ("position", "revisits")),
+    Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one"),
+    Smooth("time", "time", lambda t: t.time_s, "one", TIME),
     Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", ("position", "returns")),
     Smooth("time_and_load", "load", lambda t: t.time_s, "load", needs=("scale", "revisits")),
+    Smooth("time_and_current", "load", lambda t: t.time_s, "current", TIME, GAIN),
     Smooth("temperature", "temperature", lambda t: np.asarray(t.temperature_c), "friction", WARM),
 )

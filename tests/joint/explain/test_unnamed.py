@@ -79,6 +79,7 @@ def track():
         ("time_and_speed", lambda t: t.time_s, lambda t: [t.direction, t.velocity], 0),
         ("time_and_load", lambda t: t.time_s,
          lambda t: [np.sin(t.position_rad), np.cos(t.position_rad), t.acceleration], 0),
+        ("time_and_current", lambda t: t.time_s, lambda t: [t.model_a], 1),
     ],
 )  # fmt: skip
 def test_a_smooth_function_is_cosines_of_its_covariate_times_what_it_changes(
@@ -90,7 +91,7 @@ def test_a_smooth_function_is_cosines_of_its_covariate_times_what_it_changes(
     expected = np.stack([part * wave for part in modifiers(track) for wave in waves], axis=1)
     np.testing.assert_allclose(effect.columns(track, {"degree": 4.0}), expected)
     assert [guess["degree"] for guess in effect.guesses(track, track.time_s)] == [2, 4, 8, 16]
-    assert effect.from_motion is (name != "load")
+    assert effect.from_motion is (name != "load" and not name.endswith("current"))
     assert effect.changes_in_time is name.startswith("time")
 
 
