@@ -305,6 +305,12 @@ def logged(paths: list[str]) -> tuple[Floats, Floats]:
     if len(fed) < max(len(axes) / 2, 2):
         msg = f"{paths[0]}: an arm is found from the positions and currents of all axes: log them"
         raise InputError(msg)
+    if axes != list(range(1, len(axes) + 1)) or len(axes) > len(STARTS[0]):
+        msg = (
+            f"{paths[0]}: holds axes {', '.join(map(str, axes))}; an arm of axes 1 to n, of "
+            f"{len(STARTS[0])} at most, is found: number them so from the base on"
+        )
+        raise InputError(msg)
     motions, currents = [], []
     for run in runs:
         names = [run.positions[axis] for axis in axes], [f"axis{axis}_current" for axis in fed]
@@ -314,12 +320,18 @@ def logged(paths: list[str]) -> tuple[Floats, Floats]:
         places, drawn = np.unwrap(places[:, known]), drawn[:, known]
         rate = run.sampling_rate_hz
         window = max(5, int(WINDOW_S * rate) // 2 * 2 + 1)
+        if places.shape[1] <= 3 * window:
+            msg = f"{run.path}: {places.shape[1]} samples are known on all axes: too few"
+            raise InputError(msg)
         smooth = [savgol_filter(places, window, 3, order, 1 / rate) for order in range(3)]
         motions.append(np.array(smooth)[:, :, window:-window])
         currents.append(np.full((len(axes), places.shape[1] - 2 * window), np.nan))
         currents[-1][np.isin(axes, fed)] = savgol_filter(drawn, window, 3)[:, window:-window]
     motion, current = np.concatenate(motions, axis=2), np.concatenate(currents, axis=1)
     moving = (np.abs(motion[1]) > 0.02 * np.abs(motion[1]).max(axis=1)[:, None]).any(axis=0)
+    if np.count_nonzero(moving) < SAMPLES:
+        msg = f"{paths[0]}: {np.count_nonzero(moving)} samples of motion, {SAMPLES} are needed"
+        raise InputError(msg)
     return motion[:, :, moving], current[:, moving]
 
 

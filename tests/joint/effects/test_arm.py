@@ -99,6 +99,20 @@ def test_an_arm_keeps_its_energy_and_its_weight_has_a_potential(arm):
     assert np.isclose(v @ turning, 0.5 * v @ changing @ v, rtol=1e-6)
 
 
+def saved(folder, rate, columns):
+    """Write a run."""
+    record = json.dumps({"sampling_rate_hz": rate}).encode()
+    table = pa.table(columns).replace_schema_metadata({b"opamc": record})
+    pq.write_table(table, folder / "run.parquet")
+
+
+def searched(folder):
+    """Have the run's joints found by a copy of arm.py that holds none."""
+    (folder / "arm.py").write_text(ARM.read_text())
+    words = (sys.executable, str(folder / "arm.py"), str(folder / "run.parquet"))
+    return subprocess.run(words, capture_output=True, text=True, check=False)
+
+
 def recorded(arm, folder, lacks, axes=range(1, 7)):
     """40 s of random motions of all axes, the current of axis 4 with one thing more."""
     rate, rng, noise = 200.0, np.random.default_rng(3), 0.02
@@ -118,9 +132,7 @@ def recorded(arm, folder, lacks, axes=range(1, 7)):
     else:
         current += 0.2 / np.mean(v[3] ** 2) * v[3] * np.abs(v[3])
     columns = {f"axis{axis}_position": q[axis - 1] for axis in axes}
-    table = pa.table({"axis4_current": current, **columns})
-    record = json.dumps({"sampling_rate_hz": rate}).encode()
-    pq.write_table(table.replace_schema_metadata({b"opamc": record}), folder / "run.parquet")
+    saved(folder, rate, {"axis4_current": current, **columns})
     (folder / "arm.py").write_text(f"{ARM.read_text()}\n\nJOINTS = {UR10}\n")
     (folder / "model.yaml").write_text(
         "library: [arm.py]\neffects: [arm, inertia, offset, coulomb, viscous]\n"
@@ -196,12 +208,9 @@ def test_an_arm_is_found_from_all_currents(arm, tmp_path):
     current += 0.02 * rng.normal(size=current.shape)
     motion[0, 2] += 0.06  # An encoder whose zero is off.
     columns = {f"axis{k + 1}_position": motion[0, k] for k in range(4)}
-    table = pa.table(columns | {f"axis{k + 1}_current": current[k] for k in range(4)})
-    record = json.dumps({"sampling_rate_hz": rate}).encode()
-    pq.write_table(table.replace_schema_metadata({b"opamc": record}), tmp_path / "run.parquet")
-    (tmp_path / "arm.py").write_text(ARM.read_text())
-    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
-    told = subprocess.run(words, capture_output=True, text=True, check=True)
+    saved(tmp_path, rate, columns | {f"axis{k + 1}_current": current[k] for k in range(4)})
+    told = searched(tmp_path)
+    assert told.returncode == 0
     assert "axis 1 " in told.stdout
     found = loaded(tmp_path / "arm.py")
     for joint, torque in enumerate(asked_of):
@@ -213,27 +222,34 @@ def test_an_arm_is_found_from_all_currents(arm, tmp_path):
 
 def test_an_arm_is_not_found_without_its_currents(arm, tmp_path):
     recorded(arm, tmp_path, "quadratic_friction")
-    (tmp_path / "arm.py").write_text(ARM.read_text())
-    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
-    told = subprocess.run(words, capture_output=True, text=True, check=False)
+    told = searched(tmp_path)
     assert told.returncode != 0
     assert "currents of all axes" in told.stderr
     assert "Traceback" not in told.stderr
     assert (tmp_path / "arm.py").read_text() == ARM.read_text()
 
 
-def test_an_arm_is_not_found_where_currents_do_not_tell(tmp_path):
+@pytest.mark.parametrize(
+    ("first", "axes", "samples", "moving", "said"),
+    [
+        (1, 3, 2000, True, "does not tell where the joints are"),
+        (2, 3, 2000, True, "holds axes 2, 3, 4; an arm of axes 1 to n, of 7 at most"),
+        (1, 8, 2000, True, "holds axes 1, 2, 3, 4, 5, 6, 7, 8; an arm of axes 1 to n, of 7"),
+        (1, 3, 12, True, "12 samples are known on all axes: too few"),
+        (1, 3, 2000, False, "0 samples of motion, 500 are needed"),
+    ],
+)
+def test_an_arm_is_not_found_where_a_run_does_not_tell(
+    tmp_path, first, axes, samples, moving, said
+):
     rng = np.random.default_rng(8)
-    t = np.arange(2000) / 100.0
-    q = [np.sin(speed * t) for speed in (0.7, 1.1, 1.7)]
-    columns = {f"axis{k + 1}_position": q[k] for k in range(3)}
-    columns |= {f"axis{k + 1}_current": rng.normal(size=t.size) for k in range(3)}
-    record = json.dumps({"sampling_rate_hz": 100.0}).encode()
-    table = pa.table(columns).replace_schema_metadata({b"opamc": record})
-    pq.write_table(table, tmp_path / "run.parquet")
-    (tmp_path / "arm.py").write_text(ARM.read_text())
-    words = (sys.executable, str(tmp_path / "arm.py"), str(tmp_path / "run.parquet"))
-    told = subprocess.run(words, capture_output=True, text=True, check=False)
+    t = np.arange(samples) / 100.0
+    names = range(first, first + axes)
+    columns = {f"axis{k}_position": moving * np.sin(0.4 * (k + 1) * t) for k in names}
+    columns |= {f"axis{k}_current": rng.normal(size=t.size) for k in names}
+    saved(tmp_path, 100.0, columns)
+    told = searched(tmp_path)
     assert told.returncode == 1
-    assert "does not tell where the joints are" in told.stderr
+    assert said in told.stderr
+    assert "Traceback" not in told.stderr
     assert (tmp_path / "arm.py").read_text() == ARM.read_text()
