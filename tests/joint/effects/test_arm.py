@@ -99,6 +99,16 @@ def test_an_arm_keeps_its_energy_and_its_weight_has_a_potential(arm):
     assert np.isclose(v @ turning, 0.5 * v @ changing @ v, rtol=1e-6)
 
 
+def waves(joints, rate, rng):
+    """Time, and angles, speeds and accelerations of 40 s of random motions, (joints, n)."""
+    t, many = np.arange(int(40 * rate)) / rate, (joints, 5, 1)
+    speed, phase = rng.uniform(0.2, 3.0, many), rng.uniform(0, 6, many)
+    size, angle = rng.uniform(0.1, 0.4, many), speed * t + phase
+    q = (size * np.sin(angle)).sum(1)
+    v = (size * speed * np.cos(angle)).sum(1)
+    return t, q, v, -(size * speed**2 * np.sin(angle)).sum(1)
+
+
 def saved(folder, rate, columns):
     """Write a run."""
     record = json.dumps({"sampling_rate_hz": rate}).encode()
@@ -116,12 +126,7 @@ def searched(folder):
 def recorded(arm, folder, lacks, axes=range(1, 7)):
     """40 s of random motions of all axes, the current of axis 4 with one thing more."""
     rate, rng, noise = 200.0, np.random.default_rng(3), 0.02
-    t = np.arange(int(40 * rate)) / rate
-    waves = rng.uniform(0.2, 3.0, (6, 5)), rng.uniform(0, 6, (6, 5)), rng.uniform(0.1, 0.4, (6, 5))
-    speed, phase, size = (one[:, :, None] for one in waves)
-    q = (size * np.sin(speed * t + phase)).sum(1)
-    v = (size * speed * np.cos(speed * t + phase)).sum(1)
-    a = -(size * speed**2 * np.sin(speed * t + phase)).sum(1)
+    t, q, v, a = waves(6, rate, rng)
     own, motion = links(4), np.array([q, v, a])
     current = asked(arm, motion, own)[3] / 5
     current += 0.3 * a[3] + 0.4 * np.sign(v[3]) + 0.1 * v[3] + noise * rng.normal(size=t.size)
@@ -195,12 +200,7 @@ def test_an_arm_is_found_from_all_currents(arm, tmp_path):
         )
     )
     rate, rng = 100.0, np.random.default_rng(5)
-    t = np.arange(int(40 * rate)) / rate
-    waves = rng.uniform(0.2, 3.0, (4, 5)), rng.uniform(0, 6, (4, 5)), rng.uniform(0.1, 0.4, (4, 5))
-    speed, phase, size = (one[:, :, None] for one in waves)
-    q = (size * np.sin(speed * t + phase)).sum(1)
-    v = (size * speed * np.cos(speed * t + phase)).sum(1)
-    a = -(size * speed**2 * np.sin(speed * t + phase)).sum(1)
+    _, q, v, a = waves(4, rate, rng)
     motion, own = np.array([q, v, a]), links(6)
     asked_of = [arm.torques(motion, k) @ own[k:4].ravel() for k in range(4)]
     current = np.array(asked_of) + 0.5 * a + np.sign(v) + 0.5 * v
