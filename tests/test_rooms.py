@@ -13,7 +13,7 @@ PACKAGE = ROOT / "opamc_cli"
 
 LAYERS = (
     {"errors"},
-    {"signal", "decision", "joint", "testbed"},
+    {"signal", "decision", "joint", "robot"},
     {"config"},
     {"storage"},
     {"stages"},

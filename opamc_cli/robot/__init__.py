@@ -1,0 +1,1 @@
+"""What a whole robot does: the torques of an arm's links, the virtual one."""
