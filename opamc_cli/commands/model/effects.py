@@ -41,7 +41,7 @@ def effects(
     from opamc_cli.commands.terminal.fitted import FittedTable
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.joint.effects.library import built_in_library, effect_named
-    from opamc_cli.stages.model.users_effects import load_user_effects
+    from opamc_cli.stages.model.declared.users_effects import load_user_effects
 
     library = built_in_library()
     for file in load_joint_model(model).library if model else ():

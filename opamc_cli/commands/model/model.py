@@ -242,7 +242,7 @@ def _naming(model: Path) -> Iterator[None]:
     """Name the model's file in what is wrong with it."""
     from opamc_cli.config.joint_model import line_naming
     from opamc_cli.joint.effects.library import UnknownEffectError
-    from opamc_cli.stages.model.users_effects import UserEffectError
+    from opamc_cli.stages.model.declared.users_effects import UserEffectError
 
     try:
         yield

@@ -19,8 +19,8 @@ from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track
 from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.signal.plausible.commanded import apart
-from opamc_cli.stages.model.declared_terms import declared_term
-from opamc_cli.stages.model.users_effects import load_user_effects
+from opamc_cli.stages.model.declared.terms import declared_term
+from opamc_cli.stages.model.declared.users_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import (
     gaps,
     positions_beside,
