@@ -129,7 +129,7 @@ def test_science_opens_no_files():
             assert not {other[:1] for other in others} & banned, ".".join(one)
 
 
-@pytest.mark.parametrize("room", ["signal", "decision", "joint"])
+@pytest.mark.parametrize("room", ["signal", "decision", "joint", "robot/arm"])
 def test_every_module_has_a_test_of_its_name(room):
     """In the same folder; with its own folder's name ahead, where another has the same name.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from opamc_cli.commands.model.arm import arm
 from opamc_cli.commands.model.effects import effects
 from opamc_cli.commands.model.shown import (
     fields_table,
@@ -48,6 +49,7 @@ Axis = Annotated[
 ]
 
 app.command()(effects)
+app.command()(arm)
 
 
 MOST_COEFFICIENTS = 4
