@@ -134,6 +134,9 @@ def _held_out(x: Floats, y: Floats) -> float:
     """Mean square of what blocks that are left out in turn keep."""
     block = np.arange(len(y)) * BLOCKS // len(y)
     parts = [(x[block == k], y[block == k]) for k in range(BLOCKS)]
-    gram, moment = x.T @ x + RIDGE * len(y) * np.eye(x.shape[1]), x.T @ y
-    rest = [b - a @ np.linalg.solve(gram - a.T @ a, moment - a.T @ b) for a, b in parts]
+    grams = np.stack([a.T @ a for a, _ in parts])
+    moments = np.stack([a.T @ b for a, b in parts])
+    ridge = RIDGE * len(y) * np.eye(x.shape[1])
+    held = np.linalg.solve(grams.sum(0) + ridge - grams, (moments.sum(0) - moments)[:, :, None])
+    rest = [b - a @ own[:, 0] for (a, b), own in zip(parts, held, strict=True)]
     return float(np.mean(np.concatenate(rest) ** 2)) + 1e-8

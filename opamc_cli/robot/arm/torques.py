@@ -10,7 +10,6 @@ Vector = tuple[float, float, float]
 GRAVITY_M_S2 = 9.81
 PARAMETERS = 10
 """Of a link."""
-_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 @dataclass(frozen=True)
@@ -61,63 +60,83 @@ def torques(chain: KinematicChain, motion: Floats, first: int = 0) -> list[Float
         link from the joint outwards, about the origin of its joint's frame.
     """
     n = motion.shape[2]
-    spin, spin_up = np.zeros((3, n)), np.zeros((3, n))
     up = np.array(chain.up) / np.linalg.norm(chain.up)
+    spin, spin_up = np.zeros((3, n)), np.zeros((3, n))
     lift = np.broadcast_to(GRAVITY_M_S2 * up[:, None], (3, n))
-    lines: list[tuple[Floats, Floats]] = []
-    """Of each joint wanted: its axis, and the axis' cross product with the way from it."""
+    # Of each joint wanted: its axis, and the cross product of that with the way from it.
+    lines = levers = np.zeros((3, 0, n))
     found: list[list[Floats]] = []
     for link, joint in enumerate(chain.joints):
         angle, speed, acceleration = motion[:, link]
         way, about = np.array(joint.xyz), np.array(joint.axis) / np.linalg.norm(joint.axis)
-        lift = lift + _cross(spin_up, way) + _cross(spin, _cross(spin, way))
-        lines = [(line, lever + _cross(line, way)) for line, lever in lines]
-        back = turned(joint.rpy).T
-        carried = [back @ one for one in (spin, spin_up, lift, *(v for ab in lines for v in ab))]
-        spin, spin_up, lift, *rest = _turned_back(about, angle, np.stack(carried, axis=1))
-        lines = list(zip(rest[::2], rest[1::2], strict=True))
+        lift = lift + np.einsum("kjn,j->kn", _carrying(spin, spin_up), way)
+        levers = levers + _cross(lines, way)
+        carried = np.concatenate(
+            [np.stack([spin, spin_up, lift], axis=1), lines, levers], axis=1
+        ).reshape(3, -1)
+        carried = (turned(joint.rpy).T @ carried).reshape(3, -1, n)
+        carried = _turned_back(about, angle, carried)
+        spin, spin_up, lift = carried[:, 0], carried[:, 1], carried[:, 2]
+        lines, levers = np.split(carried[:, 3:], 2, axis=1)
         spin_up = spin_up + about[:, None] * acceleration + _cross(spin, about) * speed
         spin = spin + about[:, None] * speed
         if link >= first:
-            lines.append((np.broadcast_to(about[:, None], (3, n)), np.zeros((3, n))))
+            own = np.broadcast_to(about[:, None, None], (3, 1, n))
+            lines = np.concatenate([lines, own], axis=1)
+            levers = np.concatenate([levers, 0 * own], axis=1)
             found.append([])
         force, moment = _asked(lift, spin, spin_up)
-        for (line, lever), blocks in zip(lines, found, strict=True):
-            both = (line[:, None] * moment).sum(axis=0)
-            both[:4] += (lever[:, None] * force).sum(axis=0)
-            blocks.append(both)
+        both = sum(line[:, None] * one for line, one in zip(lines, moment, strict=True))
+        for lever, one in zip(levers, force, strict=True):
+            both[:, :4] += lever[:, None] * one
+        for blocks, block in zip(found, both, strict=True):
+            blocks.append(block)
     return [np.concatenate(blocks).T for blocks in found]
+
+
+def _carrying(spin: Floats, spin_up: Floats) -> Floats:
+    """By a way in a turning body: its point's acceleration less the origin's, (3, 3, n)."""
+    (u, v, w), (x, y, z) = spin, spin_up
+    uv, vw, wu = u * v, v * w, w * u
+    uu, vv, ww = u * u, v * v, w * w
+    return np.array(
+        [
+            [-vv - ww, uv - z, wu + y],
+            [uv + z, -uu - ww, vw - x],
+            [wu - y, vw + x, -uu - vv],
+        ]
+    )
 
 
 def _asked(lift: Floats, spin: Floats, spin_up: Floats) -> tuple[Floats, Floats]:
     """Force by mass and first moments, (3, 4, n), and moment by all parameters, (3, 10, n)."""
-    n = spin.shape[1]
-    force, moment = np.zeros((3, 4, n)), np.zeros((3, PARAMETERS, n))
-    force[:, 0] = lift
-    for k, side in enumerate(np.eye(3)):
-        force[:, k + 1] = _cross(spin_up, side) + _cross(spin, _cross(spin, side))
-        moment[:, k + 1] = -_cross(lift, side)
-    for place, (one, two) in enumerate(_PAIRS, start=4):
-        turning, rate = np.zeros((3, n)), np.zeros((3, n))
-        turning[one], rate[one] = spin[two], spin_up[two]
-        turning[two], rate[two] = spin[one], spin_up[one]
-        moment[:, place] = rate + _cross(spin, turning)
+    (u, v, w), (x, y, z), (f, g, h) = spin, spin_up, lift
+    none = np.zeros_like(u)
+    uv, vw, wu = u * v, v * w, w * u
+    uu, vv, ww = u * u, v * v, w * w
+    force = np.concatenate([lift[:, None], _carrying(spin, spin_up)], axis=1)
+    # Euler's equations, of each inertia alone.
+    moment = np.array(
+        [
+            [none, none, h, -g, x, y - wu, z + uv, -vw, vv - ww, vw],
+            [none, -h, none, f, wu, x + vw, ww - uu, y, z - uv, -wu],
+            [none, g, -f, none, -uv, uu - vv, x - vw, uv, y + wu, z],
+        ]
+    )
     return force, moment
 
 
 def _turned_back(about: Floats, angle: Floats, vectors: Floats) -> Floats:
-    """Vectors, (3, k, n), as a frame sees them that has turned, (k, 3, n): Rodrigues' formula."""
-    sin, cos = np.sin(angle), np.cos(angle)
-    across = _cross(vectors, about)
+    """Vectors, (3, k, n), as a frame sees them that has turned: Rodrigues' formula."""
     along = np.tensordot(about, vectors, axes=1)
-    turned = cos * vectors + sin * across + about[:, None, None] * ((1 - cos) * along)
-    return turned.swapaxes(0, 1)
+    ahead = about[:, None, None] * ((1 - np.cos(angle)) * along)
+    return np.asarray(np.cos(angle) * vectors + np.sin(angle) * _cross(vectors, about) + ahead)
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
     """Cross product over the first axis: numpy's own takes thrice as long."""
     (u, v, w), (x, y, z) = a, b
-    return np.stack([v * z - w * y, w * x - u * z, u * y - v * x])
+    return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
 
 
 def turned(rpy: Vector) -> Floats:
