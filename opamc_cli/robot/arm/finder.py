@@ -21,6 +21,8 @@ WAYS = dict(zip("xyzXYZ", np.vstack([np.eye(3), 0 - np.eye(3)]).tolist(), strict
 """A capital letter's axis turns the other way."""
 SAMPLES, BLOCKS = 500, 6
 """Looked at; left out in turn."""
+FITTED, ROUGH, FINE = 6, 3, 8
+"""So many of the best words without lengths get some, in so many steps, the best of them finer."""
 RIDGE, LONG = 1e-7, 0.02
 """Of links' parameters, in the current's deviation; of ways from axis to axis (m), zeros (rad)."""
 
@@ -42,26 +44,39 @@ class Finder:
         self.known: dict[tuple[str, bytes], Floats] = {}
         self.joints = {}
         """Of each that moves: at which samples, its own friction, its current."""
+        alone, travel = [], np.ptp(self.motion[0], axis=1)
         for joint, (q, v, a) in enumerate(self.motion.swapaxes(0, 1)):
             moves = np.abs(v) > SLOWEST_SHARE * np.abs(v).max()
+            moves &= bool(travel[joint] > SLOWEST_SHARE * travel.max())
             y = current[joint, some][moves]
             if moves.sum() > SAMPLES / 10 and np.isfinite(y).all() and np.ptp(y) > 0:
                 own = _friction(q[moves], v[moves], a[moves])
-                self.joints[joint] = moves, own, (y - y.mean()) / y.std()
+                y = (y - y.mean()) / y.std()
+                self.joints[joint] = moves, own, y
+                weight = np.sin(q[moves]), np.cos(q[moves])
+                alone.append(_held_out(np.column_stack([own, *weight]), y))
+        self.alone = np.array(alone)
+        """Share of each one's mean square that it leaves in blocks left out without an arm."""
 
     def found(self) -> tuple[str, Floats]:
-        """Return the axes' letters, and ways from each to the next and its zero, (joints, 4)."""
+        """Return the axes' letters, and the way to each and its zero, (joints, 4).
+
+        To the first there is no way that its torque tells of: there it is where up is.
+        """
         none = np.zeros((self.motion.shape[1], 4))
         starts = {start[: len(none)] for start in STARTS}
-        best: list[tuple[float, str, Floats]] = []
         for word in sorted(starts, key=lambda one: self.score(one, none))[:2]:
-            ways, letters, last = none, self.exchanged(word, none), ""
-            while letters != last and len(best) < 8:
-                last, ways = letters, self.fitted(letters, ways)
-                best.append((self.score(letters, ways), letters, ways))
-                letters = self.exchanged(letters, ways)
-        _, letters, ways = min(best, key=lambda one: one[0])
-        return letters, self.fitted(letters, ways)
+            self.exchanged(word, none)
+        # Mirror images are as good as each other; what turns the other way is hardly worse.
+        words = {round(self.score(word, none), 6): word for word, _ in list(self.known)}
+        tried = [words[score] for score in sorted(words)[:FITTED]]
+        ways = {word: self.fitted(word, none, ROUGH) for word in tried}
+        word = min(tried, key=lambda one: self.score(one, ways[one]))
+        best, found = "", ways[word]
+        while word != best:
+            best, found = word, self.fitted(word, found, FINE)
+            word = self.exchanged(best, found)
+        return best, found
 
     def score(self, letters: str, ways: Floats) -> float:
         """Sum the logarithms of what is left of each joint's current."""
@@ -86,20 +101,20 @@ class Finder:
                 return letters
             letters = best
 
-    def fitted(self, letters: str, ways: Floats) -> Floats:
+    def fitted(self, letters: str, ways: Floats, steps: int) -> Floats:
         """Fit ways and zeros, beside links' parameters that are best for each."""
         sizes = np.sqrt(self.left(letters, ways))
 
         def left(free: Floats) -> Floats:
-            designs = self._designs(letters, np.vstack([np.zeros(4), free.reshape(-1, 4)]))
+            designs = self._designs(letters, free.reshape(-1, 4))
             found = [LONG * free]
             for x, size, (_, _, y) in zip(designs, sizes, self.joints.values(), strict=True):
                 held = np.linalg.solve(x.T @ x + RIDGE * len(y) * np.eye(x.shape[1]), x.T @ y)
                 found.append((y - x @ held) / (size * np.sqrt(len(y))))
             return np.concatenate(found)
 
-        free = least_squares(left, ways[1:].ravel(), max_nfev=8, x_scale=0.2).x
-        return np.vstack([np.zeros(4), free.reshape(-1, 4)])
+        free = least_squares(left, ways.ravel(), max_nfev=steps, x_scale=0.2).x
+        return np.asarray(free.reshape(-1, 4))
 
     def _designs(self, letters: str, ways: Floats) -> list[Floats]:
         asked = torques(chain_of(letters, ways), self.motion)
@@ -113,12 +128,16 @@ class Finder:
 
 
 def chain_of(letters: str, ways: Floats) -> KinematicChain:
-    """Return the chain of axes along letters, with ways to them and zeros, (joints, 4)."""
-    places = []
+    """Return the chain of axes along letters, with ways to them and zeros, (joints, 4).
+
+    The first one's way is how far off z up is.
+    """
+    places, (right, ahead, *_) = [], ways[0].tolist()
+    ways = np.vstack([[0.0, 0.0, 0.0, ways[0, 3]], ways[1:]])
     for letter, (*way, zero) in zip(letters, ways.tolist(), strict=True):
         x, y, z = WAYS[letter]
         places.append(JointPlace(tuple(way), (zero * x, zero * y, zero * z), (x, y, z)))
-    return KinematicChain(tuple(places))
+    return KinematicChain(tuple(places), (right, ahead, 1.0))
 
 
 def _friction(q: Floats, v: Floats, a: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """Stage `arm`: runs of an arm whose joints all move in; where its joints are out, as arm.yaml."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 from scipy.signal import savgol_filter
+from threadpoolctl import threadpool_limits
 
-from opamc_cli.config.joint_model import ArmConfig, ArmJoint
+from opamc_cli.config.joint_model import ARM, ArmConfig, ArmJoint, JointModelConfig
 from opamc_cli.config.yaml.values import yaml_of
-from opamc_cli.errors import InputError, NotEnoughDataError, UsageError
+from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError, UsageError
 from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.robot.arm.finder import MOST_AXES, SAMPLES, Finder, chain_of
@@ -21,11 +22,31 @@ from opamc_cli.storage.runs.run import Run
 
 WINDOW_S = 0.06
 """Motion and current are differentiated and smoothed so."""
-MOST_LEFT = 0.3
-"""Of the current's deviation, in blocks left out, by half of the joints: 28 simulated programs of a
-minute leave 0.005 to 0.05, one whose payload changes 0.303, a measured one of two seconds 3.1."""
+LEAST_GAIN = 4.0
+"""How many times less half of the joints leave of their currents, in blocks left out, than without
+an arm: 5.5 to 100 times in 28 simulated programs of ten arms, at most 2.5 in two whose payload
+changes; 1.3 in two measured ones of two seconds each, 1.0 to 2.0 where joints that ask nothing of
+each other move."""
+SHORT = 2.0
+"""Deviations by which half of the joints by themselves miss blocks left out, above which a program
+is too short to tell an arm: 1.04 at the most in those, 3.5 and 6.1 in each of the measured."""
+REMEDY = (
+    "give a longer program in which all axes move and the payload stays, or write the joints as a "
+    "robot's URDF has them"
+)
 DECLARED = ("arm", "inertia", "offset", "coulomb", "viscous")
 """Beside the arm: `inertia` is the rotor's."""
+FEWEST_AXES = 4
+"""What links ask of the joints of fewer is what searched couplings hold."""
+LONGEST_S, PIECES = 240.0, 24
+"""Of more than that many seconds such pieces are looked at, ten seconds each."""
+FOUND = (
+    "axis {}: where the arm's joints are was found from all axes' currents, and what its links ask "
+    "is declared (`opamc model arm` writes them; `without: [arm]` searches couplings instead)"
+)
+NOT_FOUND = "axis {}: what other joints ask is searched joint by joint, since {}"
+UNTOLD = "the runs do not tell where the arm's joints are (`opamc model arm` says why)"
+UNLIKE = "the arm that was found explains its current no better than the joint by itself"
 FIRST_LINE = "# Found by `opamc model arm`"
 
 
@@ -38,15 +59,19 @@ class FoundArm:
     """What each axis is parallel to where all are at zero; a capital's turns the other way."""
     left: dict[int, float]
     """By axis: share of the current's deviation that is left in blocks left out."""
+    alone: dict[int, float]
+    """The same without an arm."""
 
 
-def find_arm(paths: Runs) -> FoundArm:
+def find_arm(paths: Runs, fewest: int = 2) -> FoundArm:
     """Find where the joints of an arm are, from positions and currents of all of its axes.
 
     Parameters
     ----------
     paths : sequence of (str, Path)
         Names and files of the runs.
+    fewest : int
+        Of axes that move, with a current.
 
     Raises
     ------
@@ -58,22 +83,65 @@ def find_arm(paths: Runs) -> FoundArm:
     with ExitStack() as stack:
         runs = [stack.enter_context(Run(path, name)) for name, path in paths]
         motion, current = _logged(runs)
-    finder = Finder(motion, current)
-    letters, ways = finder.found()
+    with threadpool_limits(1):  # With more, sums of products would differ in the last digit.
+        finder = Finder(motion, current)
+        alone = np.sqrt(finder.alone)
+        if alone.size < fewest:
+            msg = f"{paths[0][1]}: {alone.size} axes with a current move, {fewest} are needed"
+            raise InputError(msg)
+        if np.median(alone) > SHORT:
+            msg = f"{paths[0][1]}: is too short to tell where the joints are; {REMEDY}"
+            raise NotEnoughDataError(msg)
+        letters, ways = finder.found()
     shares = np.sqrt(finder.left(letters, ways))
-    left = {joint + 1: float(share) for joint, share in zip(finder.joints, shares, strict=True)}
-    if np.median(shares) > MOST_LEFT:
+    axes = [joint + 1 for joint in finder.joints]
+    left, without = (dict(zip(axes, one.tolist(), strict=True)) for one in (shares, alone))
+    if np.median(alone / shares) < LEAST_GAIN:
         msg = (
-            f"{paths[0][1]}: does not tell where the joints are (best, {letters}, leaves of the "
-            f"current of axis {told(left)}); give a longer program in which all axes move, or "
-            "write the joints as a robot's URDF has them"
+            f"{paths[0][1]}: does not tell where the joints are (the best, {letters}, leaves of "
+            f"the current of axis {told(left)}, and no arm {told(without)}); {REMEDY}"
         )
         raise NotEnoughDataError(msg)
-    joints = [
+    chain = chain_of(letters, ways)
+    joints = tuple(
         ArmJoint(xyz=_rounded(one.xyz), rpy=_rounded(one.rpy), axis=_rounded(one.axis))
-        for one in chain_of(letters, ways).joints
-    ]
-    return FoundArm(ArmConfig(joints=tuple(joints)), letters, left)
+        for one in chain.joints
+    )
+    arm = ArmConfig(joints=joints, up=_rounded(chain.up))
+    return FoundArm(arm, letters, left, without)
+
+
+def arm_told(model: JointModelConfig, paths: Runs) -> FoundArm | str | None:
+    """Return the arm that runs tell of, or why they do not; None where nobody asks.
+
+    Not asked are models that say something of an arm, or of what other joints ask, and runs in
+    which less than four axes with position and current move.
+    """
+    said = {entry.effect for entry in model.declared()} | {*model.without}
+    if model.arm is not None or said & {ARM, "coupling"}:
+        return None
+    try:
+        return find_arm(paths, FEWEST_AXES)
+    except NotEnoughDataError:
+        return UNTOLD
+    except OpamcError:  # Which the work on the axes says, too.
+        return None
+
+
+def on_axis(
+    model: JointModelConfig, told_of: FoundArm | str | None, axis: int
+) -> tuple[JointModelConfig, str | None]:
+    """Return the model of an axis with the arm, and what is to be said of that.
+
+    Without it where it explains no more of the axis' own current than the joint by itself.
+    """
+    if told_of is None:
+        return model, None
+    if isinstance(told_of, str):
+        return model, NOT_FOUND.format(axis, told_of)
+    if axis in told_of.left and told_of.left[axis] < told_of.alone[axis]:
+        return model.model_copy(update={"arm": told_of.arm}), FOUND.format(axis)
+    return model, NOT_FOUND.format(axis, UNLIKE)
 
 
 def told(left: dict[int, float]) -> str:
@@ -126,9 +194,9 @@ def _logged(runs: Sequence[Run]) -> tuple[Floats, Floats]:
         )
         raise InputError(msg)
     motions, currents = [], []
-    for run in runs:
+    for run, start, stop in _pieces(runs):
         names = [run.positions[axis] for axis in axes], [f"axis{axis}_current" for axis in fed]
-        samples = run.read([*names[0], *names[1]])
+        samples = run.read([*names[0], *names[1]], start, stop)
         places, drawn = (np.array([samples[name] for name in some], float) for some in names)
         known = np.isfinite(places).all(axis=0) & np.isfinite(drawn).all(axis=0)
         places, drawn = np.unwrap(places[:, known]), drawn[:, known]
@@ -148,3 +216,14 @@ def _logged(runs: Sequence[Run]) -> tuple[Floats, Floats]:
         msg = f"{first}: {np.count_nonzero(moving)} samples of motion, {SAMPLES} are needed"
         raise InputError(msg)
     return motion[:, :, moving], current[:, moving]
+
+
+def _pieces(runs: Sequence[Run]) -> Iterator[tuple[Run, int, int]]:
+    """Yield the samples that are looked at, (start, stop) of runs: pieces of long ones."""
+    short = sum(run.duration_s for run in runs) <= LONGEST_S
+    for run in runs:
+        size = int(min(LONGEST_S / PIECES * run.sampling_rate_hz, run.n_samples))
+        size = run.n_samples if short else size
+        count = 1 if short else max(PIECES // len(runs), 1)
+        for start in np.linspace(0, run.n_samples - size, count).astype(int).tolist():
+            yield run, start, start + size
