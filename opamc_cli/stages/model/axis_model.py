@@ -130,7 +130,7 @@ def library_of(model: JointModelConfig) -> Library:
             "have them found by `opamc model arm RUN...`"
         )
         raise ConfigError(msg)
-    for name in model.without:
+    for name in {*model.without} - {ARM}:
         effect_named(library, name)
     return library
 

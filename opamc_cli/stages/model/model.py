@@ -17,6 +17,7 @@ from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import close_loop, untestable
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials
+from opamc_cli.stages.model.arm import FoundArm, arm_told, on_axis
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import OPPOSITE, lay
 from opamc_cli.stages.model.doubts import DRIVEN_T, doubts_of
@@ -186,7 +187,7 @@ def close(
     seed : int
         For the decoys.
     """
-    work = partial(_closed, seed)
+    work = partial(_closed, seed, arm_told(model, paths))
     done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)
     ensure_directory(out)
     candidates = [row for each in done for row in each.candidates]
@@ -215,7 +216,14 @@ def _drives(closed: Fit) -> bool:
     return bool(min(drag_t(closed), *inertia, 0.0) < -DRIVEN_T)
 
 
-def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
+def _closed(
+    seed: int,
+    told: FoundArm | str | None,
+    model: JointModelConfig,
+    runs: Sequence[Run],
+    axis: int,
+) -> _Closed:
+    model, of_arm = on_axis(model, told, axis)
     laid = lay(model, runs, axis)
     loop = close_loop(laid.fit, laid.library, seed, ways=laid.ways)
     # What a heavy joint of an arm that moves all of them draws tells its sign only beside what the
@@ -228,6 +236,8 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
             if not _drives(again.after):  # Or something else than the sign is wrong.
                 laid, loop = negative, again
                 laid.notes.append(OPPOSITE.format(axis))
+    if of_arm is not None:
+        laid.notes.append(of_arm)
     if laid.ways.strokes_turned:
         laid.notes.append(TURNED.format(axis, laid.ways.strokes_turned))
     sure = certainty(loop.after)

@@ -54,6 +54,7 @@ def test_what_is_found_is_a_model(tmp_path, capsys):
         (1, 8, 2000, True, 3, "holds axes 1, 2, 3, 4, 5, 6, 7, 8; an arm of axes 1 to n, of 7"),
         (1, 3, 12, True, 3, "12 samples are known on all axes: too few"),
         (1, 3, 2000, False, 3, "0 samples of motion, 500 are needed"),
+        (1, 3, 60, True, 3, "46 samples of motion, 500 are needed"),
         (1, 0, 2000, True, 3, "from the positions and currents of all axes"),
     ],
 )
@@ -71,6 +72,55 @@ def test_a_run_that_does_not_tell_is_refused(
     assert said in error
     assert error.count("\n") == 1
     assert not out.exists()
+
+
+def close(tmp_path, capsys, run, text, axis=3):
+    """Close an axis; what it says, loop.json's entry, and the model that is written."""
+    model, out = tmp_path / "model.yaml", tmp_path / "out"
+    model.write_text(text)
+    given = ("--model", model, "--axis", axis, "--out", out, "--jobs", 1)
+    _, _, said = called(capsys, "model", "close", run, *given)
+    (loop,) = json.loads((out / "loop.json").read_text())["axes"]
+    return said, loop, yaml.safe_load((out / "model.yaml").read_text())
+
+
+def test_a_close_finds_the_arm_by_itself(tmp_path, capsys):
+    run = arms.small_run(tmp_path)
+    said, loop, written = close(tmp_path, capsys, run, "effects: [inertia, gravity, coulomb]\n")
+    assert "was found from all axes' currents" in said
+    assert loop["declared"] == ["arm", "inertia", "coulomb"]
+    assert [one["effect"] for one in loop["steps"]] == ["viscous"]
+    assert loop["after"]["rmse_a"] < 0.05
+    assert len(written["arm"]["joints"]) == 4
+    applied = ("--model", tmp_path / "out" / "model.yaml", "--out", tmp_path / "on")
+    assert called(capsys, "model", "evaluate", run, *applied)[0] == 0
+    (one,) = json.loads((tmp_path / "on" / "evaluation.json").read_text())["axes"]
+    assert one["rmse_a"] < 0.05
+    assert called(capsys, "report", "--out", tmp_path / "out")[0] == 0
+
+
+@pytest.mark.parametrize("without", ["arm", "coupling"])
+def test_a_close_finds_no_arm_where_the_model_says_something_of_it(tmp_path, capsys, without):
+    run = arms.small_run(tmp_path)
+    text = f"effects: [inertia, gravity, coulomb, viscous]\nwithout: [{without}]\n"
+    said, loop, written = close(tmp_path, capsys, run, text)
+    assert "currents" not in said
+    assert "arm" not in loop["declared"]
+    assert "arm" not in written
+
+
+def test_a_close_says_that_runs_do_not_tell_of_an_arm(tmp_path, capsys):
+    rng, t = np.random.default_rng(8), np.arange(3000) / 100.0
+    columns = {}
+    for k in range(1, 5):  # Joints that ask nothing of each other.
+        angle, speed = np.sin(0.4 * (k + 1) * t), 0.4 * (k + 1) * np.cos(0.4 * (k + 1) * t)
+        noise = 0.05 * rng.normal(size=t.size)
+        columns[f"axis{k}_current"] = np.cos(angle) + np.sign(speed) + noise
+        columns[f"axis{k}_position"] = angle
+    run = arms.saved(tmp_path / "run.parquet", 100.0, columns)
+    said, loop, written = close(tmp_path, capsys, run, "without: []\n")
+    assert "do not tell where the arm's joints are" in said
+    assert "arm" not in {*loop["declared"], *written}
 
 
 @pytest.mark.parametrize(
