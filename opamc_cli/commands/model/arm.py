@@ -30,11 +30,14 @@ def arm(
     found = find_arm(paths)
     write_arm(found, paths, out)
     output.passed_over(runs)
+    if found.part != "whole":
+        output.note(f"found in the {found.part} of the motion alone: does the payload change?")
     output.result(
         {
             "arm": found.arm.model_dump(mode="json"),
             "zero": found.letters,
             "left": {str(axis): share for axis, share in found.left.items()},
+            "part": found.part,
             "written": str(out),
         },
         f"{len(found.letters)} joints found, axes at zero along {found.letters}; left of the "

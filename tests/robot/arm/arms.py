@@ -123,8 +123,12 @@ def small_arm(rate=100.0):
     return motion, torque, current
 
 
-def small_run(folder):
+def small_run(folder, payload_kg=0.0):
+    """Write a run of it, which carries something from half of its time on."""
     motion, _, current = small_arm()
+    held = np.array([1.0, 0.3, 0.1, 0.1, *(0.1, 0.0, 0.0, 0.1, 0.0, 0.1)]) * payload_kg
+    late = np.arange(current.shape[1]) > current.shape[1] // 2
+    current += late * [one[:, -10:] @ held for one in torques(SMALL, motion)]
     columns = {f"axis{k + 1}_position": motion[0, k] for k in range(4)}
     columns |= {f"axis{k + 1}_current": current[k] for k in range(4)}
     return saved(folder / "run.parquet", 100.0, columns)

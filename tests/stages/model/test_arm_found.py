@@ -46,6 +46,14 @@ def test_what_is_found_is_a_model(tmp_path, capsys):
     assert out.read_text() == "effects: [arm]\n"
 
 
+def test_an_arm_is_found_beside_a_payload_that_changes(tmp_path, capsys):
+    run, out = arms.small_run(tmp_path, payload_kg=8.0), tmp_path / "arm.yaml"
+    code, told, _ = called(capsys, "model", "arm", run, "--out", out, "--json")
+    assert code == 0
+    assert json.loads(told)["part"] == "last third"
+    assert json.loads(told)["left"]["3"] < 0.05
+
+
 @pytest.mark.parametrize(
     ("first", "axes", "samples", "moving", "code", "said"),
     [
