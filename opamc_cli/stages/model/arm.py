@@ -48,6 +48,7 @@ FOUND = (
 NOT_FOUND = "axis {}: what other joints ask is searched joint by joint, since {}"
 PARTS = {"whole": (0, 3), "last third": (2, 3), "first third": (0, 1)}
 UNTOLD = "the runs do not tell where the arm's joints are (`opamc model arm` says why)"
+LEAVES_MORE = "they leave less than the arm that was found"
 UNLIKE = "the arm that was found explains its current no better than the joint by itself"
 FIRST_LINE = "# Found by `opamc model arm`"
 

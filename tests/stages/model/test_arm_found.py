@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from opamc_cli.__main__ import main
-from opamc_cli.config.joint_model import load_joint_model
+from opamc_cli.config.joint_model import ArmConfig, ArmJoint, load_joint_model
+from opamc_cli.stages.model.arm import FoundArm
 
 sys.path.append(str(Path(__file__).parents[2] / "robot" / "arm"))
 import arms
@@ -105,6 +106,18 @@ def test_a_close_finds_the_arm_by_itself(tmp_path, capsys):
     (one,) = json.loads((tmp_path / "on" / "evaluation.json").read_text())["axes"]
     assert one["rmse_a"] < 0.05
     assert called(capsys, "report", "--out", tmp_path / "out")[0] == 0
+
+
+def test_a_wrong_arm_gives_way_to_couplings(tmp_path, capsys, monkeypatch):
+    lying = tuple(ArmJoint(axis=(1.0, 0.0, 0.0)) for _ in range(4))
+    found = FoundArm(ArmConfig(joints=lying), "xxxx", {3: 0.1}, {3: 0.5}, "whole")
+    monkeypatch.setattr("opamc_cli.stages.model.model.arm_told", lambda *_: found)
+    run = arms.small_run(tmp_path)
+    said, loop, written = close(tmp_path, capsys, run, "without: []\n")
+    assert "they leave less than the arm that was found" in said
+    assert "was found from all axes' currents" not in said
+    assert "arm" not in {*loop["declared"], *written}
+    assert "coupling" in {step["effect"] for step in loop["steps"]}
 
 
 @pytest.mark.parametrize("without", ["arm", "coupling"])
