@@ -49,7 +49,6 @@ NOT_FOUND = "axis {}: what other joints ask is searched joint by joint, since {}
 PARTS = {"whole": (0, 3), "last third": (2, 3), "first third": (0, 1)}
 UNTOLD = "the runs do not tell where the arm's joints are (`opamc model arm` says why)"
 LEAVES_MORE = "they leave less than the arm that was found"
-UNLIKE = "the arm that was found explains its current no better than the joint by itself"
 FIRST_LINE = "# Found by `opamc model arm`"
 
 
@@ -151,17 +150,10 @@ def arm_told(model: JointModelConfig, paths: Runs) -> FoundArm | str | None:
 def on_axis(
     model: JointModelConfig, told_of: FoundArm | str | None, axis: int
 ) -> tuple[JointModelConfig, str | None]:
-    """Return the model of an axis with the arm, and what is to be said of that.
-
-    Without it where it explains no more of the axis' own current than the joint by itself.
-    """
-    if told_of is None:
-        return model, None
-    if isinstance(told_of, str):
-        return model, NOT_FOUND.format(axis, told_of)
-    if axis in told_of.left and told_of.left[axis] < told_of.alone[axis]:
+    """Return the model of an axis with the arm, and what is to be said of that."""
+    if isinstance(told_of, FoundArm):
         return model.model_copy(update={"arm": told_of.arm}), FOUND.format(axis)
-    return model, NOT_FOUND.format(axis, UNLIKE)
+    return model, told_of and NOT_FOUND.format(axis, told_of)
 
 
 def told(left: dict[int, float]) -> str:
