@@ -1,7 +1,7 @@
 """Stage `arm`: runs of an arm whose joints all move in; where its joints are out, as arm.yaml."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,7 +46,8 @@ FOUND = (
     "is declared (`opamc model arm` writes them; `without: [arm]` searches couplings instead)"
 )
 NOT_FOUND = "axis {}: what other joints ask is searched joint by joint, since {}"
-PARTS = {"whole": (0, 3), "last third": (2, 3), "first third": (0, 1)}
+PARTS = {"last third": (2, 3), "first third": (0, 1)}
+"""Asked where the whole does not tell."""
 UNTOLD = "the runs do not tell where the arm's joints are (`opamc model arm` says why)"
 LEAVES_MORE = "they leave less than the arm that was found"
 FIRST_LINE = "# Found by `opamc model arm`"
@@ -93,14 +94,15 @@ def find_arm(paths: Runs, fewest: int = 2) -> FoundArm:
         runs = [stack.enter_context(Run(path, name)) for name, path in paths]
         motion, current = _logged(runs)
     named, n = paths[0][1], motion.shape[2]
-    tried: list[FoundArm] = []
-    for part, (first, last) in PARTS.items():
+    whole = found = _found(motion, current, fewest, named, "whole")
+    for part, (first, last) in PARTS.items() if n >= 3 * SAMPLES else ():
+        if found.gain >= LEAST_GAIN:
+            break
         some = slice(n * first // 3, n * last // 3)
-        if not tried or n >= 3 * SAMPLES:
-            tried.append(_found(motion[:, :, some], current[:, some], fewest, named, part))
-        if tried[-1].gain >= LEAST_GAIN:
-            return tried[-1]
-    whole = tried[0]
+        with suppress(OpamcError):  # Too little moves there, or for too short.
+            found = _found(motion[:, :, some], current[:, some], fewest, named, part)
+    if found.gain >= LEAST_GAIN:
+        return found
     msg = (
         f"{named}: does not tell where the joints are (the best, {whole.letters}, leaves of the "
         f"current of axis {told(whole.left)}, and no arm {told(whole.alone)}); {REMEDY}"

@@ -133,8 +133,9 @@ def test_a_close_finds_no_arm_where_the_model_says_something_of_it(tmp_path, cap
 def test_a_close_says_that_runs_do_not_tell_of_an_arm(tmp_path, capsys):
     rng, t = np.random.default_rng(8), np.arange(3000) / 100.0
     columns = {}
-    for k in range(1, 5):  # Joints that ask nothing of each other.
-        angle, speed = np.sin(0.4 * (k + 1) * t), 0.4 * (k + 1) * np.cos(0.4 * (k + 1) * t)
+    for k in range(1, 5):  # Joints that ask nothing of each other, one after the other.
+        own = np.clip(t - 7.5 * (k - 1), 0, 7.5)
+        angle, speed = np.sin(2 * own), np.cos(2 * own) * (own > 0) * (own < 7.5)
         noise = 0.05 * rng.normal(size=t.size)
         columns[f"axis{k}_current"] = np.cos(angle) + np.sign(speed) + noise
         columns[f"axis{k}_position"] = angle
