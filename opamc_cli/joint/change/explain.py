@@ -18,7 +18,7 @@ from opamc_cli.joint.change.slow import (
     shift_power,
     with_model,
 )
-from opamc_cli.joint.change.units import Compared, Follow, follow, followed, read_side, side_by_side
+from opamc_cli.joint.change.units import Compared, Follow, follow, read_side, side_by_side, turned
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
@@ -118,7 +118,7 @@ def _laid_out(
     compared = side_by_side(*sides)
     declared = [effect_named(library, name) for name in DECLARED]
     terms = tuple(Term(one, {}) for one in declared if one.untestable(compared.track) is None)
-    compared = followed(compared, terms)
+    compared = turned(compared, terms)
     late = compared.after
     if np.count_nonzero(~late) < 2 or not late.any():
         return "too few cycles or recordings whose torque axis can be followed"

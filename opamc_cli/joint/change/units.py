@@ -10,6 +10,7 @@ from opamc_cli.joint.fit.model import COARSE_RATE_HZ, Dataset, Term, grid_of
 from opamc_cli.joint.fit.parts import Sums
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.phases.torque_axis import CLEARLY
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Joint, Track, coarsen, joined
 from opamc_cli.signal.course import repeated_course
@@ -28,8 +29,8 @@ CORNER_SAMPLES = 2.0
 """From corner to corner at the median speed: of logs at 50 Hz corners at each turn of the motor hid
 the friction of three joints in five."""
 
-LOST = 2.0
-"""Phases whose torque axis was followed wrongly leave this many times the usual residual."""
+WEAK = 0.1
+"""Of the current's standard deviation: with less, phases may lose the side of the torque axis."""
 
 
 @dataclass(frozen=True)
@@ -192,17 +193,29 @@ def own_fit(
     return coefficients, sums.left(coefficients) / sums.parts.counts
 
 
-def followed(compared: Compared, terms: Sequence[Term]) -> Compared:
-    """Leave out the units whose torque axis was followed wrongly.
+def turned(compared: Compared, terms: Sequence[Term]) -> Compared:
+    """Turn what lies on the other side of the torque axis than the baseline's model has it.
 
-    Phases alone lose the side of the torque axis where there is no current for a while. Where
-    motion was logged, nothing is lost.
+    Phases alone lose that side where there is no current for a while, in one session, or in all
+    cycles of one. The model is that of the baseline's unit which leaves the least of the others.
+    Where motion was logged, nothing is lost.
     """
     late = compared.after
     if late.all() or "logged" in compared.track.channels:
         return compared
-    left = np.sqrt(own_fit(compared, terms)[1])
-    usual = float(np.quantile(left[~late], 0.25))
-    # A changed joint may leave more everywhere: the target has a usual residual of its own.
-    of_target = max(usual, float(left[late].min(initial=np.inf)))
-    return compared.only(left <= LOST * np.where(late, of_target, usual))
+    sums, own = compared.sums(terms), own_fit(compared, terms)[0][~late]
+    shares = [sums.left(np.tile(one, (late.size, 1)))[~late] / sums.power[~late] for one in own]
+    usual = own[int(np.argmin(np.median(shares, axis=1)))]
+    tracks = []
+    for fine, grid in ((True, compared.dataset.fine), (False, compared.dataset.coarse)):
+        track = grid.track
+        columns = np.concatenate([compared.dataset.columns(term, fine) for term in terms], axis=1)
+        current, model = track.current_a, columns @ usual
+        strong = np.abs(current) > WEAK * np.std(current[grid.fit])
+        edges = np.diff(np.stack([strong, grid.fit, track.group])) != 0
+        piece = np.append(0, np.cumsum(edges.any(axis=0)))
+        product = np.bincount(piece, grid.fit * current * model)
+        power = np.bincount(piece, grid.fit * (current**2 + model**2))
+        other = strong & (power + 2 * product < CLEARLY * (power - 2 * product))[piece]
+        tracks.append(replace(track, current_a=np.where(other, -current, current)))
+    return compared.along(tracks, late)

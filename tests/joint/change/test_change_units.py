@@ -20,7 +20,7 @@ from sessions import (
 
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.slow import learn, with_model
-from opamc_cli.joint.change.units import followed, own_fit, read_side, side_by_side
+from opamc_cli.joint.change.units import own_fit, read_side, side_by_side, turned
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint, block_mean
@@ -133,30 +133,56 @@ def test_by_phases_alone_the_joint_angle_s_zero_is_the_middle_of_its_travel():
     assert np.ptp(inside) == pytest.approx(np.ptp(q), rel=0.1)
 
 
-def by_phases(noisy=(), before=3, after=2, logged=False):
-    """Lay sessions side by side as if their motion came from the phases alone; some are noise."""
+def by_phases(sides, before=3, after=2, logged=False):
+    """Sessions side by side as if motion came from phases alone; `sides` of a session, (n,)."""
     tracks = read_side(recordings(before + after, spread=0.0), JOINT, cycles=False)
-    draw = np.random.default_rng(0)
     for number, track in enumerate(tracks):
         channels = track.channels if logged else track.channels - {"logged"}
-        more = 0.5 * draw.normal(size=track.size) if number in noisy else 0.0
-        tracks[number] = replace(track, channels=channels, current_a=track.current_a + more)
+        current = track.current_a * sides.get(number, lambda _: 1.0)(track)
+        tracks[number] = replace(track, channels=channels, current_a=current)
     return side_by_side(tracks[:before], tracks[before:])
 
 
-def test_where_motion_was_logged_nothing_is_left_out():
-    assert followed(by_phases((1,), logged=True), TERMS).after.size == 5
-    assert followed(by_phases((1,), before=0), TERMS).after.size == 5 - 3
+def mirrored(track):
+    return -1.0
 
 
-@pytest.mark.parametrize(
-    ("noisy", "left"),
-    [((), (3, 2)), ((2, 4), (2, 1)), ((3, 4), (3, 2))],  # a changed joint may leave more everywhere
-)
-def test_what_fits_badly_is_left_out(noisy, left):
-    after = followed(by_phases(noisy), TERMS).after
-    assert (np.count_nonzero(~after), np.count_nonzero(after)) == left
-    assert followed(by_phases(noisy, after=0), TERMS).after.size == 3 - (2 in noisy)
+def one_way(track):
+    """Turn one stroke of every cycle, as where a joint rests before and after it."""
+    return np.where(track.velocity > 0, -1.0, 1.0)
+
+
+def since_a_reversal(track):
+    slow = np.flatnonzero(~track.moving)
+    since = slow[slow > 0.6 * track.size][0]
+    return np.where(np.arange(track.size) > since, -1.0, 1.0)
+
+
+@pytest.mark.parametrize("number", [0, 2, 4])
+@pytest.mark.parametrize("side", [mirrored, one_way, since_a_reversal])
+def test_what_lies_on_the_other_side_in_a_session_is_turned(number, side):
+    right = by_phases({})
+    found = turned(by_phases({number: side}), TERMS)
+    for grid, truth in (
+        (found.dataset.fine, right.dataset.fine),
+        (found.dataset.coarse, right.dataset.coarse),
+    ):
+        wrong = grid.fit & (np.sign(grid.track.current_a) != np.sign(truth.track.current_a))
+        assert np.sum(grid.track.current_a[wrong] ** 2) < 1e-4 * np.sum(truth.track.current_a**2)
+    wanted, _ = own_fit(right, TERMS)
+    np.testing.assert_allclose(own_fit(found, TERMS)[0][number], wanted[number], atol=0.05)
+
+
+def test_nothing_is_turned_where_sides_agree_or_motion_was_logged():
+    for units in (by_phases({}), by_phases({1: one_way}, logged=True)):
+        found = turned(units, TERMS)
+        np.testing.assert_array_equal(found.track.current_a, units.track.current_a)
+
+
+def test_more_friction_is_no_other_side():
+    units = by_phases({4: lambda track: 1 + np.sign(track.velocity * track.current_a)})
+    found = turned(units, TERMS)
+    np.testing.assert_array_equal(found.track.current_a, units.track.current_a)
 
 
 def beside(load, extra=None, before=4, after=2, joint=JOINT):
