@@ -20,10 +20,10 @@ import pyarrow.parquet as pq
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
-from opamc_cli.robot.testbed.robot import Recording, simulate
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
+from opamc_cli.testbed.robot import Recording, simulate
 
 ROOT = Path(__file__).parents[1]
 FIRST_SEED = 1010

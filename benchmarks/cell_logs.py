@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST_NIGHT = date(2026, 3, 1)

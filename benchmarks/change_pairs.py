@@ -17,8 +17,8 @@ from simulator import simulate as simulate_joint
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.robot.testbed.parameters import Effect
-from opamc_cli.robot.testbed.robot import simulate as simulate_robot
+from opamc_cli.testbed.parameters import Effect
+from opamc_cli.testbed.robot import simulate as simulate_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 RATE_HZ = 2048.0

@@ -34,7 +34,6 @@ from opamc_cli.decision.divergence.discriminant import fit
 from opamc_cli.decision.divergence.features import compare
 from opamc_cli.decision.divergence.jensen_shannon import divergences_from_pool
 from opamc_cli.decision.judge import Bundle, judge
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.signal.offset import mean_over_turns
 from opamc_cli.signal.transform.analytic import clarke
 from opamc_cli.stages.chain import patterns
@@ -50,6 +49,7 @@ from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import RunSource, sources_record
 from opamc_cli.storage.tables import read_table, write_table
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = Path(__file__).resolve().parent / "out" / "decision"

@@ -26,9 +26,9 @@ import cell_logs
 import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
+from opamc_cli.testbed.robot import simulate
 
 BASELINE = 6
 FAULTY_AXIS = 3

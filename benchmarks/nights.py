@@ -27,14 +27,14 @@ from scipy.stats import kstest
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
 from opamc_cli.decision.sessions.odd_session import judge_without_odd
-from opamc_cli.robot.testbed.parameters import Robot
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.sources import RunSource
+from opamc_cli.testbed.parameters import Robot
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = Path(__file__).resolve().parent / "out" / "nights"

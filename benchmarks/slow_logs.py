@@ -21,7 +21,6 @@ from scipy.stats import rankdata
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.errors import OpamcError
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.stages.chain import score
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
@@ -30,6 +29,7 @@ from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 FINE_HZ = 500.0

@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.stages.recordings import simulate as stage
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).parents[1]
 

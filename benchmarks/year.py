@@ -28,7 +28,6 @@ import numpy as np
 from opamc_cli.config import load_config
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.stages.chain import identify, patterns, segment
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
@@ -37,6 +36,7 @@ from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.storage.history.rows import AlarmRow
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = Path(__file__).resolve().parent / "out" / "year"

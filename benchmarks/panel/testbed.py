@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.robot.testbed.parameters import Effect
-from opamc_cli.robot.testbed.robot import AxisRecording, simulate
+from opamc_cli.testbed.parameters import Effect
+from opamc_cli.testbed.robot import AxisRecording, simulate
 from panel.case import RIGID, Case, Floats, Logged, Wanted
 
 CONFIG = load_testbed(Path(__file__).parents[2] / "configs" / "testbed.yaml")

@@ -13,8 +13,8 @@ from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
-from opamc_cli.robot.testbed.parameters import Effect
-from opamc_cli.robot.testbed.robot import AxisRecording, simulate
+from opamc_cli.testbed.parameters import Effect
+from opamc_cli.testbed.robot import AxisRecording, simulate
 
 CONFIG = load_testbed(Path(__file__).parents[2] / "configs" / "closing.yaml")
 RATE_HZ = CONFIG.recording.sampling_rate_hz

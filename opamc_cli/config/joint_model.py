@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import AfterValidator, Field, FiniteFloat
 
+from opamc_cli.arm.torques import JointPlace, KinematicChain
 from opamc_cli.config.files import read_values, read_yaml, validate
 from opamc_cli.config.models import JointConfig, Section
 from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import ConfigError
-from opamc_cli.robot.arm.torques import JointPlace, KinematicChain
 
 ARM = "arm"
 """The effect that `arm:` declares."""

@@ -13,9 +13,9 @@ from opamc_cli.config.files import read_values, read_yaml, refuse_other_kind, va
 from opamc_cli.config.models import Positive, Section
 from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import ConfigError
-from opamc_cli.robot.testbed.effects import complete
-from opamc_cli.robot.testbed.parameters import Effect, Robot
-from opamc_cli.robot.testbed.program import Program
+from opamc_cli.testbed.effects import complete
+from opamc_cli.testbed.parameters import Effect, Robot
+from opamc_cli.testbed.program import Program
 
 Column = Literal["phases", "current", "position", "velocity", "temperature"]
 Axis = Annotated[int, Field(ge=1)]

@@ -17,7 +17,7 @@ from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.robot.testbed.robot import simulate
+from opamc_cli.testbed.robot import simulate
 
 AXIS, RATE_HZ, SEED = 3, 2048.0, 1
 RIGID = ("inertia", "gravity", "coulomb", "viscous")

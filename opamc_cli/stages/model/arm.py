@@ -10,12 +10,12 @@ import numpy as np
 from scipy.signal import savgol_filter
 from threadpoolctl import threadpool_limits
 
+from opamc_cli.arm.finder import MOST_AXES, SAMPLES, Finder, chain_of
 from opamc_cli.config.joint_model import ARM, ArmConfig, ArmJoint, JointModelConfig
 from opamc_cli.config.yaml.values import yaml_of
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError, UsageError
 from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.robot.arm.finder import MOST_AXES, SAMPLES, Finder, chain_of
 from opamc_cli.stages.model.axes import Runs
 from opamc_cli.stages.recordings.axis_recording import MOST_MISSING
 from opamc_cli.storage.files.atomic import write_text

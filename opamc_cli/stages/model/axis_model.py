@@ -6,6 +6,7 @@ from hashlib import sha256
 
 import numpy as np
 
+from opamc_cli.arm.effects import arm_effects
 from opamc_cli.config.joint_model import ARM, DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
@@ -17,7 +18,6 @@ from opamc_cli.joint.motion.groups import FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
 from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
-from opamc_cli.robot.arm.effects import arm_effects
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.signal.plausible.commanded import apart
 from opamc_cli.stages.model.declared.terms import declared_term

@@ -13,14 +13,14 @@ import pyarrow as pa
 from opamc_cli.config.models import digest
 from opamc_cli.config.testbed import TestbedConfig
 from opamc_cli.errors import ConfigError
-from opamc_cli.robot.testbed.effects import KINDS
-from opamc_cli.robot.testbed.robot import AxisRecording, Recording, simulate
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import write_table
+from opamc_cli.testbed.effects import KINDS
+from opamc_cli.testbed.robot import AxisRecording, Recording, simulate
 
 STAGE = "simulate"
 TRUTH_FOLDER = "truth"

@@ -8,10 +8,10 @@ import pytest
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.robot.testbed.robot import simulate
 from opamc_cli.stages.chain import segment
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
+from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).parents[3]
 

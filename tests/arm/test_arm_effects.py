@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from opamc_cli.__main__ import main
+from opamc_cli.arm.effects import arm_effects
+from opamc_cli.arm.torques import torques
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.robot.arm.effects import arm_effects
-from opamc_cli.robot.arm.torques import torques
 
 
 def recorded(folder, lacks):

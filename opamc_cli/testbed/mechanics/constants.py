@@ -2,9 +2,9 @@
 
 from math import cos, exp, inf, pi, sin, sqrt
 
-from opamc_cli.robot.testbed.mechanics.kernel import AxisConstants
-from opamc_cli.robot.testbed.parameters import Damage, Joint, Sensor
-from opamc_cli.robot.testbed.session import AxisSession
+from opamc_cli.testbed.mechanics.kernel import AxisConstants
+from opamc_cli.testbed.parameters import Damage, Joint, Sensor
+from opamc_cli.testbed.session import AxisSession
 
 GRAVITY_M_S2 = 9.80665
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from opamc_cli.robot.testbed.mechanics.kernel import AxisConstants
-from opamc_cli.robot.testbed.parameters import Effect
+from opamc_cli.testbed.mechanics.kernel import AxisConstants
+from opamc_cli.testbed.parameters import Effect
 
 Constants = dict[str, float]
 _Change = Callable[[Constants, float, dict[str, float]], None]

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from opamc_cli.robot.arm.torques import JointPlace, KinematicChain, torques, turned
+from opamc_cli.arm.torques import JointPlace, KinematicChain, torques, turned
 
 UR10 = (
     ((0.0, 0.0, 0.1273), (0.0, 0.0, 0.0), (0, 0, 1)),

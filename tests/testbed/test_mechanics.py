@@ -12,18 +12,13 @@ from robot_variations import (
     with_joint,
 )
 
-from opamc_cli.robot.testbed.mechanics.constants import GRAVITY_M_S2, axis_constants
-from opamc_cli.robot.testbed.mechanics.kernel import (
-    AxisConstants,
-    motor_friction,
-    run_axis,
-    smooth_sign,
-)
-from opamc_cli.robot.testbed.mechanics.mesh import damaged_share, zone_torque
-from opamc_cli.robot.testbed.parameters import Damage, Robot
-from opamc_cli.robot.testbed.program import Program
-from opamc_cli.robot.testbed.robot import AxisRecording, Recording, simulate
-from opamc_cli.robot.testbed.session import draw_session
+from opamc_cli.testbed.mechanics.constants import GRAVITY_M_S2, axis_constants
+from opamc_cli.testbed.mechanics.kernel import AxisConstants, motor_friction, run_axis, smooth_sign
+from opamc_cli.testbed.mechanics.mesh import damaged_share, zone_torque
+from opamc_cli.testbed.parameters import Damage, Robot
+from opamc_cli.testbed.program import Program
+from opamc_cli.testbed.robot import AxisRecording, Recording, simulate
+from opamc_cli.testbed.session import draw_session
 
 EVERY_STEP_HZ = 16000.0  # sampling at the integration step
 

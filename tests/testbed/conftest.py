@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
-from opamc_cli.robot.testbed.parameters import Robot
-from opamc_cli.robot.testbed.program import Program
+from opamc_cli.testbed.parameters import Robot
+from opamc_cli.testbed.program import Program
 
-CONFIG = Path(__file__).parents[3] / "configs" / "testbed.yaml"
+CONFIG = Path(__file__).parents[2] / "configs" / "testbed.yaml"
 
 
 @pytest.fixture(scope="session")

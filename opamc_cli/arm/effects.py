@@ -4,12 +4,12 @@ from functools import cache
 
 import numpy as np
 
+from opamc_cli.arm.torques import PARAMETERS, KinematicChain, torques
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.effects.payload_change import PayloadChange
 from opamc_cli.joint.motion.track import Floats, Ints, Track
-from opamc_cli.robot.arm.torques import PARAMETERS, KinematicChain, torques
 
 INDEPENDENT = 1e-9
 """Share of the strongest: weaker combinations of the links' parameters never reach the joint."""

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from opamc_cli.robot.testbed.mechanics.mesh import damaged_share, zone_torque
+from opamc_cli.testbed.mechanics.mesh import damaged_share, zone_torque
 
 SIGNALS = (
     "iq_a",

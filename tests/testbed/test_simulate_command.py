@@ -13,7 +13,7 @@ from opamc_cli.errors import ConfigError, ExitCode
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
 
-CONFIGS = Path(__file__).parents[3] / "configs"
+CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = """
 based_on: {base}
 program: {{axes: [2, 3], cycles: 1}}

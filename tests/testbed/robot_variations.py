@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from opamc_cli.robot.testbed.parameters import Joint, Robot
+from opamc_cli.testbed.parameters import Joint, Robot
 
 
 def with_joint(robot: Robot, axis: int, **parts: dict[str, Any]) -> Robot:

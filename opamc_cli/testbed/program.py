@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.robot.testbed.trajectory import Move, evaluate_move, plan_move
+from opamc_cli.testbed.trajectory import Move, evaluate_move, plan_move
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opamc_cli.robot.testbed.effects import KINDS, complete, delayed
-from opamc_cli.robot.testbed.parameters import Effect, Robot
-from opamc_cli.robot.testbed.program import Program
-from opamc_cli.robot.testbed.robot import AxisRecording, simulate
+from opamc_cli.testbed.effects import KINDS, complete, delayed
+from opamc_cli.testbed.parameters import Effect, Robot
+from opamc_cli.testbed.program import Program
+from opamc_cli.testbed.robot import AxisRecording, simulate
 
 SIZES = {
     "inertia": 0.05,

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.optimize import least_squares
 
-from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE
-from opamc_cli.robot.arm.torques import (
+from opamc_cli.arm.torques import (
     GRAVITY_M_S2,
     PARAMETERS,
     Floats,
@@ -12,6 +11,7 @@ from opamc_cli.robot.arm.torques import (
     KinematicChain,
     torques,
 )
+from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE
 
 STARTS = ("zyyyzyx", "zyyyzxz", "zyyxyxy", "zyyzyzy", "zyzyzyz", "zyxyxyx", "yyyyyyy")
 """What the axes are parallel to where all are at zero: arms whose three middle ones are parallel,

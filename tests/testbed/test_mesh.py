@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.robot.testbed.mechanics.mesh import damaged_share, zone_torque
+from opamc_cli.testbed.mechanics.mesh import damaged_share, zone_torque
 
 angles = st.floats(-50.0, 50.0)
 windups = st.floats(-3e-3, 3e-3)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opamc_cli.robot.testbed.parameters import Damage, Robot
-from opamc_cli.robot.testbed.program import Program
-from opamc_cli.robot.testbed.robot import simulate, top_velocity_rad_s
-from opamc_cli.robot.testbed.sensors import phase_currents, quantise
-from opamc_cli.robot.testbed.session import draw_session
+from opamc_cli.testbed.parameters import Damage, Robot
+from opamc_cli.testbed.program import Program
+from opamc_cli.testbed.robot import simulate, top_velocity_rad_s
+from opamc_cli.testbed.sensors import phase_currents, quantise
+from opamc_cli.testbed.session import draw_session
 
 
 def test_a_seed_and_session_give_the_same_recording(robot: Robot, program: Program) -> None:

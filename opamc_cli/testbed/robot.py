@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter
 
-from opamc_cli.robot.testbed.effects import (
+from opamc_cli.testbed.effects import (
     apply_to_constants,
     apply_to_reported,
     apply_to_sensors,
     complete,
 )
-from opamc_cli.robot.testbed.mechanics.constants import axis_constants
-from opamc_cli.robot.testbed.mechanics.kernel import SIGNALS, AxisConstants, run_axis
-from opamc_cli.robot.testbed.parameters import Damage, Effect, Joint, Robot
-from opamc_cli.robot.testbed.program import Program, Schedule, reference, schedule
-from opamc_cli.robot.testbed.sensors import phase_currents
-from opamc_cli.robot.testbed.session import AxisSession, draw_session, stream
+from opamc_cli.testbed.mechanics.constants import axis_constants
+from opamc_cli.testbed.mechanics.kernel import SIGNALS, AxisConstants, run_axis
+from opamc_cli.testbed.parameters import Damage, Effect, Joint, Robot
+from opamc_cli.testbed.program import Program, Schedule, reference, schedule
+from opamc_cli.testbed.sensors import phase_currents
+from opamc_cli.testbed.session import AxisSession, draw_session, stream
 
 _CONTROL_HZ = 4000.0
 _STEP_HZ = 16000.0

@@ -4,7 +4,7 @@ import arms
 import numpy as np
 import pytest
 
-from opamc_cli.robot.arm.torques import torques
+from opamc_cli.arm.torques import torques
 
 
 def test_two_links_on_parallel_axes_are_the_planar_elbow():

@@ -3,8 +3,8 @@
 import arms
 import numpy as np
 
-from opamc_cli.robot.arm.finder import Finder, chain_of
-from opamc_cli.robot.arm.torques import torques
+from opamc_cli.arm.finder import Finder, chain_of
+from opamc_cli.arm.torques import torques
 
 
 def test_an_arm_is_found_from_all_currents():

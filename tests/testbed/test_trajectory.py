@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.robot.testbed.trajectory import evaluate_move, plan_move
+from opamc_cli.testbed.trajectory import evaluate_move, plan_move
 
 positive = st.floats(0.05, 50.0)
 

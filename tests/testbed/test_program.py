@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opamc_cli.robot.testbed.program import Program, reference, schedule
+from opamc_cli.testbed.program import Program, reference, schedule
 
 
 def _plan(program: Program):

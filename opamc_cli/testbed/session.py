@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.robot.testbed.parameters import Robot
+from opamc_cli.testbed.parameters import Robot
 
 
 @dataclass(frozen=True)

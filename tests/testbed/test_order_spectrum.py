@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from robot_variations import NO_ERROR, with_joint
 
-from opamc_cli.robot.testbed.parameters import Robot
-from opamc_cli.robot.testbed.program import Program
-from opamc_cli.robot.testbed.robot import simulate
+from opamc_cli.testbed.parameters import Robot
+from opamc_cli.testbed.program import Program
+from opamc_cli.testbed.robot import simulate
 
 TURNS = 200
 """Motor turns of the spectrum: lines at 2 and 2 (N + 1) / N are 4 bins apart."""
