@@ -13,7 +13,7 @@ PACKAGE = ROOT / "opamc_cli"
 
 LAYERS = (
     {"errors"},
-    {"signal", "decision", "joint", "testbed"},
+    {"signal", "decision", "joint", "arm", "testbed"},
     {"config"},
     {"storage"},
     {"stages"},
@@ -23,8 +23,8 @@ LAYERS = (
 """From the ground up; a thing knows its own layer and those below."""
 
 MOST_THINGS = 9
-DOORS = {"api.py", "entry.py", "py.typed"}
-"""Beside `__init__` and `__main__`: where others come in."""
+DOORS = {"api.py", "entry.py", "errors.py", "py.typed"}
+"""Beside `__init__` and `__main__`: where others come in, and what they catch."""
 ENTRIES = {("__init__",), ("entry",)}
 """What is imported for the version, or for what it does."""
 SHELVES = {"joint/effects", "stages/report/figures"}
@@ -129,7 +129,7 @@ def test_science_opens_no_files():
             assert not {other[:1] for other in others} & banned, ".".join(one)
 
 
-@pytest.mark.parametrize("room", ["signal", "decision", "joint"])
+@pytest.mark.parametrize("room", ["signal", "decision", "joint", "arm"])
 def test_every_module_has_a_test_of_its_name(room):
     """In the same folder; with its own folder's name ahead, where another has the same name.
 

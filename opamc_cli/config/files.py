@@ -167,7 +167,7 @@ def _keys_of(values: Any, place: Sequence[int | str], *, missing: bool) -> Itera
     Pydantic names the choices of "a word or a section" as well, which the values do not hold.
     """
     for depth, part in enumerate(place, 1):
-        entry = isinstance(values, list) and isinstance(part, int)
+        entry = isinstance(values, list) and isinstance(part, int) and part < len(values)
         if entry or (isinstance(values, Mapping) and part in values):
             values = values[part]
             yield part

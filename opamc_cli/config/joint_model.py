@@ -5,11 +5,18 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import Field, FiniteFloat
+from pydantic import AfterValidator, Field, FiniteFloat
 
-from opamc_cli.config.files import read_values, validate
+from opamc_cli.arm.torques import JointPlace, KinematicChain
+from opamc_cli.config.files import read_values, read_yaml, validate
 from opamc_cli.config.models import JointConfig, Section
 from opamc_cli.config.shipped import shipped_file
+from opamc_cli.errors import ConfigError
+
+ARM = "arm"
+"""The effect that `arm:` declares."""
+OF_THE_ARM = ("gravity", "coupling")
+"""What an arm's torques hold: neither declared by default nor searched beside them."""
 
 
 class DeclaredEffect(Section):
@@ -52,6 +59,43 @@ class ClosedConfig(Section):
     )
 
 
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+def _direction(vector: Vector) -> Vector:
+    if not any(vector):
+        msg = "[0, 0, 0] is no direction; write one, such as [0, 0, 1]"
+        raise ValueError(msg)
+    return vector
+
+
+Direction = Annotated[Vector, AfterValidator(_direction)]
+
+
+class ArmJoint(Section):
+    """A joint as in a robot's URDF: its `origin` in the frame of the joint before, and its axis."""
+
+    xyz: Vector = Field((0.0, 0.0, 0.0), description="Origin, in m.")
+    rpy: Vector = Field((0.0, 0.0, 0.0), description="Roll, pitch, yaw of the frame, in rad.")
+    axis: Direction = Field((0.0, 0.0, 1.0), description="Which way it turns, in that frame.")
+
+
+class ArmConfig(Section):
+    """Where the joints of an arm are."""
+
+    joints: tuple[ArmJoint, ...] = Field(
+        min_length=1, description="Of axis 1, 2, ...; tool and payload belong to the last link."
+    )
+    up: Direction = Field(
+        (0.0, 0.0, 1.0), description="In the base's frame; [0, 0, -1] hangs from the ceiling."
+    )
+
+    def chain(self) -> KinematicChain:
+        """Return the same as the science takes it."""
+        places = (JointPlace(one.xyz, one.rpy, one.axis) for one in self.joints)
+        return KinematicChain(tuple(places), self.up)
+
+
 class JointModelConfig(Section):
     """Content of `model.yaml`."""
 
@@ -59,6 +103,11 @@ class JointModelConfig(Section):
     effects: tuple[str | DeclaredEffect, ...] = Field(
         ("inertia", "gravity", "coulomb", "viscous"),
         description="What the model holds; names, or names with parameters.",
+    )
+    arm: ArmConfig | None = Field(
+        None,
+        description="Where the joints of the arm are, or a file whose `arm` tells: its torques "
+        "are declared in place of gravity.",
     )
     library: tuple[Path, ...] = Field(
         (), description="Python files with effects of your own, relative to this file."
@@ -69,11 +118,19 @@ class JointModelConfig(Section):
     closed: ClosedConfig | None = Field(None, description="Written by `opamc model close`.")
 
     def declared(self) -> tuple[DeclaredEffect, ...]:
-        """Return the effects, each with its parameters."""
-        return tuple(
+        """Return the effects, each with its parameters; an arm's torques are one."""
+        named = tuple(
             DeclaredEffect(effect=entry) if isinstance(entry, str) else entry
             for entry in self.effects
         )
+        if self.arm is None or ARM in {entry.effect for entry in named}:
+            return named
+        beside = (entry for entry in named if entry.effect not in OF_THE_ARM)
+        return (DeclaredEffect(effect=ARM), *beside)
+
+    def not_searched(self) -> tuple[str, ...]:
+        """Return the effects that the loop must not use."""
+        return self.without if self.arm is None else (*self.without, *OF_THE_ARM)
 
 
 def line_naming(path: Path, name: str) -> int | None:
@@ -113,8 +170,20 @@ def load_joint_model(path: Path, overrides: Sequence[str] = ()) -> JointModelCon
     """
     file = shipped_file(path, "configs")
     values: dict[str, Any] = read_values(file, overrides)
-    model = validate(JointModelConfig, values, str(path), overrides)
     folder = file.parent
+    if isinstance(named := values.get(ARM), str):
+        by_hand = any(override.partition("=")[0] == ARM for override in overrides)
+        values[ARM] = _arm_of(Path(named) if by_hand else folder / named)
+    model = validate(JointModelConfig, values, str(path), overrides)
     return model.model_copy(
         update={"library": tuple((folder / file).resolve() for file in model.library)}
     )
+
+
+def _arm_of(file: Path) -> Any:
+    """Return what a file says of an arm; its own `arm` must not name another file."""
+    told = read_yaml(file).get(ARM)
+    if not isinstance(told, dict):
+        msg = f"{file}: has no `arm` that tells where the joints are; `opamc model arm` finds them"
+        raise ConfigError(msg)
+    return validate(ArmConfig, told, f"{file}: {ARM}").model_dump()

@@ -18,6 +18,7 @@ ALL = [[name] for name in COMMANDS] + [
     ["model", "fit"],
     ["model", "trace"],
     ["model", "close"],
+    ["model", "arm"],
     ["config", "show"],
     ["config", "check"],
 ]

@@ -38,12 +38,14 @@ def effects(
     as_json: Json = False,
 ) -> None:
     """List the effects that a joint's model may hold, or show one with its equation."""
+    from opamc_cli.arm.effects import Arm
+    from opamc_cli.arm.torques import KinematicChain
     from opamc_cli.commands.terminal.fitted import FittedTable
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.joint.effects.library import built_in_library, effect_named
-    from opamc_cli.stages.model.users_effects import load_user_effects
+    from opamc_cli.stages.model.declared.users_effects import load_user_effects
 
-    library = built_in_library()
+    library = built_in_library() | {Arm.name: Arm(KinematicChain(()))}
     for file in load_joint_model(model).library if model else ():
         library |= {effect.name: effect for effect in load_user_effects(file)}
     output = Output(as_json)

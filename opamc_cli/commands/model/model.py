@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from opamc_cli.commands.model.arm import arm
 from opamc_cli.commands.model.effects import effects
 from opamc_cli.commands.model.shown import (
     fields_table,
@@ -48,6 +49,7 @@ Axis = Annotated[
 ]
 
 app.command()(effects)
+app.command()(arm)
 
 
 MOST_COEFFICIENTS = 4
@@ -242,7 +244,7 @@ def _naming(model: Path) -> Iterator[None]:
     """Name the model's file in what is wrong with it."""
     from opamc_cli.config.joint_model import line_naming
     from opamc_cli.joint.effects.library import UnknownEffectError
-    from opamc_cli.stages.model.users_effects import UserEffectError
+    from opamc_cli.stages.model.declared.users_effects import UserEffectError
 
     try:
         yield

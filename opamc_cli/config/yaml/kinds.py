@@ -7,7 +7,7 @@ KEYS = {
     "configuration": ("joint", "segment", "identify", "patterns", "score", "report"),
     "testbed": ("robot", "program", "recording", "faults", "effects", "based_on"),
     "map": ("columns", "time", "sampling_rate_hz", "resample_hz", "format", "separator", "header"),
-    "model": ("joint", "effects", "library", "without"),
+    "model": ("joint", "effects", "arm", "library", "without"),
     "cell": ("runs", "robots", "baseline", "out", "alarm", "keep"),
 }
 """Top keys by kind of document; `joint` alone makes a configuration."""

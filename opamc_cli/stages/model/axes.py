@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, OpamcError
 from opamc_cli.stages.model.axis_model import declared_effects, library_of
-from opamc_cli.stages.model.users_effects import users_effects_named
+from opamc_cli.stages.model.declared.users_effects import users_effects_named
 from opamc_cli.stages.processes.freed_memory import keep_freed_memory
 from opamc_cli.stages.processes.parallel import Watch, map_items
 from opamc_cli.stages.recordings.axis_recording import axes_of

@@ -6,7 +6,8 @@ from hashlib import sha256
 
 import numpy as np
 
-from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
+from opamc_cli.arm.effects import arm_effects
+from opamc_cli.config.joint_model import ARM, DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
@@ -19,8 +20,8 @@ from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track
 from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.signal.plausible.commanded import apart
-from opamc_cli.stages.model.declared_terms import declared_term
-from opamc_cli.stages.model.users_effects import load_user_effects
+from opamc_cli.stages.model.declared.terms import declared_term
+from opamc_cli.stages.model.declared.users_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import (
     gaps,
     positions_beside,
@@ -110,18 +111,26 @@ class AxisModel:
 
 
 def library_of(model: JointModelConfig) -> Library:
-    """Return the library with the user's effects, without those that the model excludes.
+    """Return the library with the user's effects and those of an arm whose joints are known.
 
     Raises
     ------
     ConfigError
-        If a file defines no effect, or a name is unknown.
+        If a file defines no effect, a name is unknown, or `arm` is declared and no joints are.
     """
     library = built_in_library()
+    if model.arm is not None:
+        library |= arm_effects(model.arm.chain())
     for path in model.library:
         for effect in load_user_effects(path):
             library[effect.name] = effect
-    for name in model.without:
+    if ARM not in library and any(declared.effect == ARM for declared in model.declared()):
+        msg = (
+            "effect 'arm' is declared, but not where the joints are: write them under `arm`, or "
+            "have them found by `opamc model arm RUN...`"
+        )
+        raise ConfigError(msg)
+    for name in {*model.without} - {ARM}:
         effect_named(library, name)
     return library
 
@@ -179,7 +188,8 @@ def lay(
         if abs(worst - stated) > RATIO_DOUBT * stated:
             read.doubts.append(OTHER_RATIO.format(axis, worst, by, stated))
             read.notes.append(read.doubts[-1])
-    allowed = {name: effect for name, effect in library.items() if name not in model.without}
+    excluded = model.not_searched()
+    allowed = {name: effect for name, effect in library.items() if name not in excluded}
     return AxisModel(axis, fit, ways, declared, allowed, read)
 
 

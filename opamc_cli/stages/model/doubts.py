@@ -31,7 +31,7 @@ ALONE = (
 
 ONE_PROGRAM = (
     "axis {}: which of the other joints load it, and what of that is an effect of its own, one "
-    "program does not tell for certain; declare the arm (configs/arm.py finds its joints), or "
+    "program does not tell for certain; tell where the arm's joints are (`arm` in model.yaml), or "
     "close it on several programs at once"
 )
 

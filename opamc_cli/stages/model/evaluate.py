@@ -29,7 +29,7 @@ from opamc_cli.stages.model.axis_model import (
     recordings_of,
     too_little_motion,
 )
-from opamc_cli.stages.model.declared_terms import declared_term
+from opamc_cli.stages.model.declared.terms import declared_term
 from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.storage.files.atomic import ensure_directory, write_json
 from opamc_cli.storage.runs.run import Run

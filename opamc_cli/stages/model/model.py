@@ -14,11 +14,12 @@ from opamc_cli.errors import UsageError
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.intervals import certainty, drag_t
 from opamc_cli.joint.fit.model import Fit
-from opamc_cli.joint.loop import close_loop, untestable
+from opamc_cli.joint.loop import Loop, close_loop, untestable
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials
+from opamc_cli.stages.model.arm import LEAVES_MORE, NOT_FOUND, FoundArm, arm_told, on_axis
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
-from opamc_cli.stages.model.axis_model import OPPOSITE, lay
+from opamc_cli.stages.model.axis_model import OPPOSITE, AxisModel, lay
 from opamc_cli.stages.model.doubts import DRIVEN_T, doubts_of
 from opamc_cli.stages.model.tables import (
     candidate_row,
@@ -186,7 +187,7 @@ def close(
     seed : int
         For the decoys.
     """
-    work = partial(_closed, seed)
+    work = partial(_closed, seed, arm_told(model, paths))
     done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)
     ensure_directory(out)
     candidates = [row for each in done for row in each.candidates]
@@ -215,19 +216,24 @@ def _drives(closed: Fit) -> bool:
     return bool(min(drag_t(closed), *inertia, 0.0) < -DRIVEN_T)
 
 
-def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
-    laid = lay(model, runs, axis)
-    loop = close_loop(laid.fit, laid.library, seed, ways=laid.ways)
-    # What a heavy joint of an arm that moves all of them draws tells its sign only beside what the
-    # others ask.
-    others = laid.dataset.fine.track.others is not None
-    if others and not laid.read.opposite and _drives(loop.after):
-        negative = lay(model, runs, axis, opposite=True)
-        if negative.read.opposite:  # Of phase currents there is none.
-            again = close_loop(negative.fit, negative.library, seed, ways=negative.ways)
-            if not _drives(again.after):  # Or something else than the sign is wrong.
-                laid, loop = negative, again
-                laid.notes.append(OPPOSITE.format(axis))
+def _closed(
+    seed: int,
+    told: FoundArm | str | None,
+    model: JointModelConfig,
+    runs: Sequence[Run],
+    axis: int,
+) -> _Closed:
+    declared = model
+    model, of_arm = on_axis(declared, told, axis)
+    laid, loop = _loop(seed, model, runs, axis)
+    if model is not declared and loop.verdict in ("partial", "not-in-library"):
+        # Couplings may hold what the arm that was found does not.
+        beside, other = _loop(seed, declared, runs, axis)
+        if other.after.rmse(sealed=False) < loop.after.rmse(sealed=False):
+            model, laid, loop = declared, beside, other
+            of_arm = NOT_FOUND.format(axis, LEAVES_MORE)
+    if of_arm is not None:
+        laid.notes.append(of_arm)
     if laid.ways.strokes_turned:
         laid.notes.append(TURNED.format(axis, laid.ways.strokes_turned))
     sure = certainty(loop.after)
@@ -247,6 +253,25 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         spectrum=spectrum_table(axis, loop),
         extended=extended_model(model, laid, loop),
     )
+
+
+def _loop(
+    seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int
+) -> tuple[AxisModel, Loop]:
+    """Close the loop on an axis, on the negative of its current where that is what was logged."""
+    laid = lay(model, runs, axis)
+    loop = close_loop(laid.fit, laid.library, seed, ways=laid.ways)
+    # What a heavy joint of an arm that moves all of them draws tells its sign only beside what the
+    # others ask.
+    others = laid.dataset.fine.track.others is not None
+    if others and not laid.read.opposite and _drives(loop.after):
+        negative = lay(model, runs, axis, opposite=True)
+        if negative.read.opposite:  # Of phase currents there is none.
+            again = close_loop(negative.fit, negative.library, seed, ways=negative.ways)
+            if not _drives(again.after):  # Or something else than the sign is wrong.
+                laid, loop = negative, again
+                laid.notes.append(OPPOSITE.format(axis))
+    return laid, loop
 
 
 def _write(

@@ -391,6 +391,7 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
             "pole_pairs": model.joint.poles_of(laid.axis),
         },
         "effects": effects,
+        **({} if model.arm is None else {"arm": model.arm.model_dump(mode="json")}),
         "library": [str(path) for path in model.library],
         "without": list(model.without),
         "closed": {

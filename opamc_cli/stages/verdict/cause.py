@@ -17,8 +17,8 @@ from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
 from opamc_cli.signal.motion.reported import unwrapped
+from opamc_cli.stages.model.declared.users_effects import load_user_effects, users_effects_named
 from opamc_cli.stages.model.kept_tracks import following
-from opamc_cli.stages.model.users_effects import load_user_effects, users_effects_named
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording, with_signs
 from opamc_cli.stages.verdict.wording.causes import (

@@ -10,7 +10,7 @@ from opamc_cli.joint.effects.library import (
     built_in_library,
     effect_named,
 )
-from opamc_cli.stages.model.users_effects import load_user_effects
+from opamc_cli.stages.model.declared.users_effects import load_user_effects
 
 VOCABULARY = [
     "inertia",

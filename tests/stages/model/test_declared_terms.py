@@ -10,7 +10,7 @@ from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.stages.model.declared_terms import declared_term
+from opamc_cli.stages.model.declared.terms import declared_term
 
 
 @pytest.mark.parametrize("name", ["load_friction", "sublinear_friction"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.errors import ConfigError
-from opamc_cli.stages.model.users_effects import load_user_effects
+from opamc_cli.stages.model.declared.users_effects import load_user_effects
 
 TRACK = SimpleNamespace(size=4, rate_hz=100.0, channels={"position"})
 HEAD = (

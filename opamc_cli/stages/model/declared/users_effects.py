@@ -67,7 +67,7 @@ CHECKS: dict[str, Callable[[Any, Any], str | None]] = {
 }
 """By method: what is wrong with what it returns on a track, if anything."""
 
-PACKAGE = Path(__file__).parents[2]
+PACKAGE = Path(__file__).parents[3]
 
 TEXTS = ("needs", "searches", "forms")
 

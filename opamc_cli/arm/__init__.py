@@ -1,0 +1,1 @@
+"""The links of an arm: what they ask of each joint, and where the joints are."""

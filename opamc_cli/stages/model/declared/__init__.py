@@ -1,0 +1,1 @@
+"""What a user declares of a joint, made ready for the fit."""
