@@ -757,15 +757,32 @@ def test_of_a_negative_that_is_driven_as_well_the_sign_is_not_turned(tmp_path, m
     q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
     current = 0.5 * np.sin(q) + 0.2 * np.sign(np.gradient(q)) + 4 * np.cos(q + beside)
     current += 0.02 * np.random.default_rng(1).normal(size=t.size)
-    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
-    write_run(tmp_path / "run.parquet", 125.0, **columns)
-    for driven, said in (((True, True), False), ((True, False), True)):
+    for sign, driven, said in ((1, (True, True), False), (-1, (True, False), True)):
+        columns = {"axis1_position": q, "axis3_position": beside}
+        write_run(tmp_path / "run.parquet", 125.0, axis1_current=sign * current, **columns)
         answers = iter(driven)
         monkeypatch.setattr(stage, "_drives", lambda fit, answers=answers: next(answers))
         assert close(tmp_path, "--axis", "1", model=MODEL) == 0
         assert ("the opposite sign of its motion" in capsys.readouterr().err) == said
         closed = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())["closed"]
         assert bool(closed.get("opposite_sign")) == said
+
+
+@pytest.mark.long
+def test_of_a_joint_whose_dry_friction_resists_the_sign_is_not_turned(tmp_path, capsys):
+    """A measured arm's fourth joint moved in step with what the others asked of it."""
+    t = np.arange(3000) / 125.0
+    q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
+    speed = np.gradient(q) * 125
+    current = 0.5 * np.sin(q) + 0.2 * np.sign(speed) + 4 * np.cos(q + beside)
+    current -= 0.4 * speed + 0.2 * np.gradient(speed) * 125
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
+    write_run(tmp_path / "run.parquet", 125.0, **columns)
+    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+    said = capsys.readouterr().err
+    assert "the opposite sign of its motion" not in said
+    assert "the declared viscous drives the joint instead of resisting" in said
 
 
 @pytest.mark.long

@@ -210,9 +210,14 @@ def close(
 
 def _drives(closed: Fit) -> bool:
     """Whether friction or inertia of a closed model are surely of the opposite sign."""
+    return min(drag_t(closed), _least_t(closed, "inertia")) < -DRIVEN_T
+
+
+def _least_t(closed: Fit, name: str) -> float:
+    """Least first coefficient of an effect of this name over its error; 0 where there is none."""
     pairs = zip(closed.terms, closed.coefficients, certainty(closed).standard_errors, strict=True)
-    inertia = [v[0] / max(e[0], 1e-300) for term, v, e in pairs if term.effect.name == "inertia"]
-    return bool(min(drag_t(closed), *inertia, 0.0) < -DRIVEN_T)
+    found = [float(v[0] / max(e[0], 1e-300)) for term, v, e in pairs if term.effect.name == name]
+    return min(found, default=0.0)
 
 
 def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
@@ -225,7 +230,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         negative = lay(model, runs, axis, opposite=True)
         if negative.read.opposite:  # Of phase currents there is none.
             again = close_loop(negative.fit, negative.library, seed, ways=negative.ways)
-            if not _drives(again.after):  # Or something else than the sign is wrong.
+            # Or something else than the sign is wrong. What moves in step with the joint may stand
+            # in its inertia and viscous friction, but hardly in its dry friction.
+            if not _drives(again.after) and _least_t(again.after, "coulomb") >= -DRIVEN_T:
                 laid, loop = negative, again
                 laid.notes.append(OPPOSITE.format(axis))
     if laid.ways.strokes_turned:
