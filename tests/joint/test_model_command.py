@@ -786,6 +786,22 @@ def test_of_a_joint_whose_dry_friction_resists_the_sign_is_not_turned(tmp_path, 
 
 
 @pytest.mark.long
+def test_by_an_inertia_just_below_0_the_sign_is_not_turned(tmp_path, capsys):
+    """A measured arm's sixth joint had one, and friction that told nothing."""
+    t = np.arange(3000) / 125.0
+    q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
+    acceleration = np.gradient(np.gradient(q)) * 125**2
+    current = 0.5 * np.sin(q) + 4 * np.cos(q + beside) - 0.002 * acceleration
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
+    write_run(tmp_path / "run.parquet", 125.0, **columns)
+    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+    said = capsys.readouterr().err
+    assert "friction would drive the joint" not in said
+    assert "axis 1: the declared inertia is below 0" in said
+
+
+@pytest.mark.long
 def test_workers_do_not_change_the_bytes(folder, capsys):
     made = {
         axis: simulate(2 + axis, (effect,), 0.8, rate=100.0, cycles=4)

@@ -19,7 +19,7 @@ from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import OPPOSITE, lay
-from opamc_cli.stages.model.doubts import DRIVEN_T, doubts_of
+from opamc_cli.stages.model.doubts import DRIVEN_T, INERTIA_T, doubts_of
 from opamc_cli.stages.model.tables import (
     candidate_row,
     explained_entry,
@@ -210,7 +210,7 @@ def close(
 
 def _drives(closed: Fit) -> bool:
     """Whether friction or inertia of a closed model are surely of the opposite sign."""
-    return min(drag_t(closed), _least_t(closed, "inertia")) < -DRIVEN_T
+    return drag_t(closed) < -DRIVEN_T or _least_t(closed, "inertia") < -INERTIA_T
 
 
 def _least_t(closed: Fit, name: str) -> float:
