@@ -17,6 +17,7 @@ from simulator import simulate
 from threadpoolctl import threadpool_limits
 
 from opamc_cli.__main__ import main
+from opamc_cli.commands.model.model import _unjudged
 from opamc_cli.errors import ExitCode
 from opamc_cli.joint.motion import kinematics
 from opamc_cli.joint.motion.kinematics import Recording
@@ -676,6 +677,19 @@ def test_a_model_is_evaluated_on_the_joint_that_it_was_closed_on(tmp_path, capsy
     opamc(*evaluate)
     entries = json.loads((tmp_path / "e" / "evaluation.json").read_text())["axes"]
     assert [entry["axis"] for entry in entries] == [2, 5]
+
+
+@pytest.mark.parametrize(("error", "another"), [(0.19, False), (0.21, True)])
+def test_a_joint_is_another_one_by_an_error_of_twice_the_models_own(error, another):
+    """A measured arm's joint hardly moved where the model knew it: r2 was -201 of a small error."""
+    result = {
+        "opposite_sign": [],
+        "not_applied": [],
+        "axis": 4,
+        "closed": {"axis": 4, "rmse_a": 0.1, "r2": 0.96},
+        "familiar": {"share": 0.6, "rmse_a": error, "r2": -201.0},
+    }
+    assert any("is another one" in said for said in _unjudged(result)) == another
 
 
 def test_a_model_that_predicts_no_better_than_the_mean_is_said_also_if_quiet(tmp_path, capsys):
