@@ -17,6 +17,7 @@ from simulator import simulate
 from threadpoolctl import threadpool_limits
 
 from opamc_cli.__main__ import main
+from opamc_cli.commands.model.model import _unjudged
 from opamc_cli.errors import ExitCode
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.motion import kinematics
@@ -679,6 +680,19 @@ def test_a_model_is_evaluated_on_the_joint_that_it_was_closed_on(tmp_path, capsy
     assert [entry["axis"] for entry in entries] == [2, 5]
 
 
+@pytest.mark.parametrize(("error", "another"), [(0.19, False), (0.21, True)])
+def test_a_joint_is_another_one_by_an_error_of_twice_the_models_own(error, another):
+    """A measured arm's joint hardly moved where the model knew it: r2 was -201 of a small error."""
+    result = {
+        "opposite_sign": [],
+        "not_applied": [],
+        "axis": 4,
+        "closed": {"axis": 4, "rmse_a": 0.1, "r2": 0.96},
+        "familiar": {"share": 0.6, "rmse_a": error, "r2": -201.0},
+    }
+    assert any("is another one" in said for said in _unjudged(result)) == another
+
+
 def test_a_model_that_predicts_no_better_than_the_mean_is_said_also_if_quiet(tmp_path, capsys):
     made = simulate(3, (), rate=250.0, cycles=6)
     run = tmp_path / "run.parquet"
@@ -758,15 +772,48 @@ def test_of_a_negative_that_is_driven_as_well_the_sign_is_not_turned(tmp_path, m
     q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
     current = 0.5 * np.sin(q) + 0.2 * np.sign(np.gradient(q)) + 4 * np.cos(q + beside)
     current += 0.02 * np.random.default_rng(1).normal(size=t.size)
-    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
-    write_run(tmp_path / "run.parquet", 125.0, **columns)
-    for driven, said in (((True, True), False), ((True, False), True)):
+    for sign, driven, said in ((1, (True, True), False), (-1, (True, False), True)):
+        columns = {"axis1_position": q, "axis3_position": beside}
+        write_run(tmp_path / "run.parquet", 125.0, axis1_current=sign * current, **columns)
         answers = iter(driven)
         monkeypatch.setattr(stage, "_drives", lambda fit, answers=answers: next(answers))
         assert close(tmp_path, "--axis", "1", model=MODEL) == 0
         assert ("the opposite sign of its motion" in capsys.readouterr().err) == said
         closed = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())["closed"]
         assert bool(closed.get("opposite_sign")) == said
+
+
+@pytest.mark.long
+def test_of_a_joint_whose_dry_friction_resists_the_sign_is_not_turned(tmp_path, capsys):
+    """A measured arm's fourth joint moved in step with what the others asked of it."""
+    t = np.arange(3000) / 125.0
+    q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
+    speed = np.gradient(q) * 125
+    current = 0.5 * np.sin(q) + 0.2 * np.sign(speed) + 4 * np.cos(q + beside)
+    current -= 0.4 * speed + 0.2 * np.gradient(speed) * 125
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
+    write_run(tmp_path / "run.parquet", 125.0, **columns)
+    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+    said = capsys.readouterr().err
+    assert "the opposite sign of its motion" not in said
+    assert "the declared viscous drives the joint instead of resisting" in said
+
+
+@pytest.mark.long
+def test_by_an_inertia_just_below_0_the_sign_is_not_turned(tmp_path, capsys):
+    """A measured arm's sixth joint had one, and friction that told nothing."""
+    t = np.arange(3000) / 125.0
+    q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
+    acceleration = np.gradient(np.gradient(q)) * 125**2
+    current = 0.5 * np.sin(q) + 4 * np.cos(q + beside) - 0.002 * acceleration
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
+    write_run(tmp_path / "run.parquet", 125.0, **columns)
+    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+    said = capsys.readouterr().err
+    assert "friction would drive the joint" not in said
+    assert "axis 1: the declared inertia is below 0" in said
 
 
 @pytest.mark.long

@@ -57,6 +57,10 @@ MOST_COEFFICIENTS = 4
 MOSTLY = 0.5
 """Share of a motion on which a model was closed, below which its error says little."""
 
+ANOTHER = 2.0
+"""Times the error that a model left of its own sealed data, above which a joint is another one:
+where it hardly moves, a right one predicts no better than the current's mean."""
+
 
 @app.command()
 def fit(
@@ -174,9 +178,11 @@ def _unjudged(result: dict[str, Any]) -> list[str]:
     said += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
     own, axis = result["closed"]["axis"], result["axis"]
     known = result["familiar"]
+    most = ANOTHER * result["closed"]["rmse_a"]
+    another = known is not None and (known["r2"] or 0.0) < 0 and known["rmse_a"] > most
     if own not in (None, axis):
         said.append(f"the model was closed on axis {own}, and says little of another joint")
-    elif known is not None and (known["r2"] or 0.0) < 0 and not result["opposite_sign"]:
+    elif another and not result["opposite_sign"]:
         said.append(
             "the model predicts no better than the current's mean even on motion that it knows: "
             "the joint, its load or the unit is another one"

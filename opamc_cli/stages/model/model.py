@@ -20,7 +20,7 @@ from opamc_cli.joint.name.search import Pool, trials
 from opamc_cli.stages.model.arm import LEAVES_MORE, NOT_FOUND, FoundArm, arm_told, on_axis
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import OPPOSITE, AxisModel, lay
-from opamc_cli.stages.model.doubts import DRIVEN_T, doubts_of
+from opamc_cli.stages.model.doubts import DRIVEN_T, INERTIA_T, doubts_of
 from opamc_cli.stages.model.tables import (
     candidate_row,
     explained_entry,
@@ -211,9 +211,14 @@ def close(
 
 def _drives(closed: Fit) -> bool:
     """Whether friction or inertia of a closed model are surely of the opposite sign."""
+    return drag_t(closed) < -DRIVEN_T or _least_t(closed, "inertia") < -INERTIA_T
+
+
+def _least_t(closed: Fit, name: str) -> float:
+    """Least first coefficient of an effect of this name over its error; 0 where there is none."""
     pairs = zip(closed.terms, closed.coefficients, certainty(closed).standard_errors, strict=True)
-    inertia = [v[0] / max(e[0], 1e-300) for term, v, e in pairs if term.effect.name == "inertia"]
-    return bool(min(drag_t(closed), *inertia, 0.0) < -DRIVEN_T)
+    found = [float(v[0] / max(e[0], 1e-300)) for term, v, e in pairs if term.effect.name == name]
+    return min(found, default=0.0)
 
 
 def _closed(
@@ -268,7 +273,9 @@ def _loop(
         negative = lay(model, runs, axis, opposite=True)
         if negative.read.opposite:  # Of phase currents there is none.
             again = close_loop(negative.fit, negative.library, seed, ways=negative.ways)
-            if not _drives(again.after):  # Or something else than the sign is wrong.
+            # Or something else than the sign is wrong. What moves in step with the joint may stand
+            # in its inertia and viscous friction, but hardly in its dry friction.
+            if not _drives(again.after) and _least_t(again.after, "coulomb") >= -DRIVEN_T:
                 laid, loop = negative, again
                 laid.notes.append(OPPOSITE.format(axis))
     return laid, loop
