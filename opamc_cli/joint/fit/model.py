@@ -327,8 +327,8 @@ class Fit:
                 smooth += grid.spread(dataset.columns(term, True) @ values)
         whole = np.stack([residual + smooth, current, np.ones(track.size)], axis=1)
         found = np.stack([residual, current], axis=1)
-        for some in (grid.fit, grid.sealed):
-            means = averaged(np.where(some[:, None], whole, 0.0), track.bounds, track.kernel)
+        for some, others in ((grid.fit, grid.sealed), (grid.sealed, grid.fit)):
+            means = averaged(np.where(others[:, None], 0.0, whole), track.bounds, track.kernel)
             unclear = some & ~track.clear
             found[unclear] = means[unclear, :2] / means[unclear, 2:]
             found[unclear, 0] -= smooth[unclear]

@@ -122,17 +122,30 @@ def test_every_moving_sample_is_judged_once(terms):
     if terms[0].effect.name == "inertia":
         smooth = terms[0].columns(track)[:, 0] * fitted.coefficients[0][0]
     half = track.kernel.size // 2
-    for some in (grid.fit, grid.sealed):
+    for some, others in ((grid.fit, grid.sealed), (grid.sealed, grid.fit)):
         rows = np.flatnonzero(some & ~track.clear)
         assert rows.size
         for row in rows:
             near = np.arange(max(row - half, 0), min(row + half + 1, track.size))
-            near = near[some[near]]
+            near = near[~others[near]]
             weights = track.kernel[near - row + half]
             rest = weights @ (fitted.residual_a + smooth)[near] / weights.sum() - smooth[row]
             assert found.residual_a[row] == pytest.approx(rest, abs=1e-9)
             mean = weights @ track.current_a[near] / weights.sum()
             assert found.current_a[row] == pytest.approx(mean, abs=1e-9)
+
+
+@pytest.mark.parametrize("quantum", [1e-5, 1e-4])
+def test_an_average_next_to_rest_is_that_of_the_acceleration(quantum):
+    """Over counted samples alone the right inertia took 7 % off an error of 0.037 A, not 65."""
+    recordings = [slow_stroke(0.5, quantum)]
+    _, grouping = grouped_track(recordings, Joint())
+    track = build_track(recordings, Joint(), Smoothing(0.2, from_velocity=False))
+    dataset = dataset_of(track, grouping)
+    with_it, without = (fit_terms(dataset, terms) for terms in (rigid(), rigid()[1:]))
+    for sealed in (False, True):
+        assert without.rmse(sealed) > 3 * 0.02
+        assert with_it.rmse(sealed) < 1.4 * 0.02
 
 
 def test_a_load_friction_is_found_together_with_the_load_whose_zero_it_moves():
