@@ -22,7 +22,7 @@ from opamc_cli.joint.name.chain import (
 )
 from opamc_cli.joint.name.form import share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
-from opamc_cli.joint.name.settle import Named, lowering, settled, worth_their_price
+from opamc_cli.joint.name.settle import Named, lowering, only_named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.signal.motion.smoothing import measurement_noise
 
@@ -168,15 +168,14 @@ def _closed(
         alone = _without_names(start, named, unnamed)
         final = alone if alone.score < final.score - LEAST_SHARE else final
     final = lowering(final)
-    only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
-    final, only_named = released(final), released(only_named)
+    final, names = released(final), released(only_named(final))
     steps = _steps(start, final, named, shares, seed)
     kept = {id(term) for term in final.terms}
     told = [one.trial.told for one in named]
     told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    fits = before, only_named.fit, final.fit, best_before
+    fits = before, names.fit, final.fit, best_before
     loop = _opened(fits, saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
 

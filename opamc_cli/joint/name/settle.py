@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
-from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.name.chain import EXACT, HALF, PRICE, Chain, extended, without
+from opamc_cli.joint.fit.model import Term, fit_terms
+from opamc_cli.joint.name.chain import EXACT, HALF, PRICE, Chain, chain_of, extended, without
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
 
@@ -79,15 +79,32 @@ def lowering(chain: Chain) -> Chain:
     """Drop what takes less than PRICE off the mean square error of all open samples, least first.
 
     Beside corners it may rise, and a part that alone tells of a term is extrapolated if left out.
+    A name goes if it takes no more beside the other names alone: functions hold most of them.
     """
-    error = chain.fit.rmse(sealed=False)
     while chain.added:
-        fewer = (without(chain, place) for place in range(chain.added))
-        least, best = min(((one.fit.rmse(sealed=False), one) for one in fewer), key=itemgetter(0))
-        if least >= error * (1 + PRICE / 2):
+        rises = []
+        for place, term in enumerate(chain.terms):
+            fewer = without(chain, place)
+            rise = _rise(fewer, chain)
+            if rise < 0 and not term.effect.unnamed:
+                rise = max(rise, _rise(only_named(fewer), only_named(chain)))
+            rises.append((rise, fewer))
+        rise, fewer = min(rises, key=itemgetter(0))
+        if rise >= 0:
             break
-        error, chain = least, best
+        chain = fewer
     return chain
+
+
+def _rise(fewer: Chain, chain: Chain) -> float:
+    return fewer.fit.rmse(sealed=False) - (1 + PRICE / 2) * chain.fit.rmse(sealed=False)
+
+
+def only_named(chain: Chain) -> Chain:
+    """Leave the functions without a name out of a chain."""
+    terms = tuple(term for term in chain.fit.terms if not term.effect.unnamed)
+    added = chain.added - (len(chain.fit.terms) - len(terms))
+    return chain if added == chain.added else chain_of(fit_terms(chain.fit.dataset, terms), added)
 
 
 def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | None:

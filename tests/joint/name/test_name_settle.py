@@ -13,7 +13,7 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of, extended
 from opamc_cli.joint.name.search import Pool, beam, trials
-from opamc_cli.joint.name.settle import _takes_the_name, settled
+from opamc_cli.joint.name.settle import _takes_the_name, lowering, settled
 
 LIBRARY = built_in_library()
 SPEED = {"stribeck_speed": 0.1, "exponent": 2.0}
@@ -146,3 +146,18 @@ def test_a_line_keeps_its_name_where_a_smooth_function_of_the_same_size_lacks_to
     line = term("ripple", order=40.0)
     _, named = settle(both, line, names=("ripple",))
     assert [one.term.effect.name for one in named] == ["ripple"]
+
+
+def test_a_name_is_not_dropped_for_what_functions_hold_beside_it():
+    def bent(q, v, a, t):
+        return q + 0.3 * np.sin(4 * q)
+
+    start = chain_of(plain_fit(joint_of("cyclic", bent, strength=15.0, rate=100.0)), 0)
+    angle = Term(unnamed_library()["unnamed_angle"], {"degree": 16.0})
+    both = extended(start, Term(LIBRARY["spring"], {}, keep=(0,)), angle)
+    alone = extended(start, angle)
+    assert alone.fit.rmse(sealed=False) < 1.005 * both.fit.rmse(sealed=False)
+    assert [one.effect.name for one in lowering(both).terms] == ["spring", "unnamed_angle"]
+    # What takes nothing off the error without them goes.
+    idle = extended(start, term("stribeck", **SPEED), angle)
+    assert [one.effect.name for one in lowering(idle).terms] == ["unnamed_angle"]
