@@ -200,7 +200,7 @@ def draw_joint(rng: np.random.Generator, path: Path) -> Joint:
 
 Shape = Callable[[Joint, np.random.Generator, float], Floats]
 EFFECTS: dict[str, Shape] = {}
-"""Current of each effect; any size, but for delays, whose length follows the strength."""
+"""Current of each effect, in any size; of a delay the strength is its length in samples."""
 
 
 def hidden(shape: Shape) -> Shape:
@@ -313,9 +313,7 @@ def elasticity(joint: Joint, rng: np.random.Generator, strength: float) -> Float
 
 @hidden
 def time_delay(joint: Joint, rng: np.random.Generator, strength: float) -> Floats:
-    # 3 to 10 ms at strength 2, 8 to 30 ms at 6.
-    samples = max(1, round(rng.uniform(1.4e-3, 5e-3) * strength * joint.path.rate_hz))
-    whole = joint.whole
+    samples, whole = round(strength), joint.whole
     return np.concatenate([np.full(samples, whole[0]), whole[:-samples]]) - whole
 
 
@@ -362,14 +360,19 @@ def record(motion: str, effect: str | None, strength: float, seed: int) -> Recor
     effect : str or None
         Key of `EFFECTS`; None for a joint that lacks nothing.
     strength : float
-        Root mean square, in units of the noise, of what no declared effect can take over. A delay
-        of the current is drawn in proportion to it instead.
+        Root mean square, in units of the noise, of what no declared effect can take over; of a
+        delay within a factor of three.
     seed : int
         Joint, path and noise do not depend on effect and strength.
 
     Returns
     -------
     Recorded
+
+    Raises
+    ------
+    ValueError
+        If no delay up to 0.1 s is of that size, or a sprung load would outweigh the whole joint.
     """
     rng = np.random.default_rng([seed, list(MOTIONS).index(motion)])
     path = MOTIONS[motion](rng, float(rng.choice(RATES_HZ)))
@@ -381,15 +384,37 @@ def record(motion: str, effect: str | None, strength: float, seed: int) -> Recor
     current = joint.whole + noise
     if effect is not None:
         own = np.random.default_rng([seed, list(EFFECTS).index(effect), 1])
-        shape = EFFECTS[effect](joint, own, strength)
-        current += (
-            shape if effect == "time_delay" else strength * noise_a * shape / rest(shape, path)
-        )
+        current += scaled(effect, joint, own, strength, noise_a)
     position = path.position
     if encoder_rad:
         position = np.round(position / encoder_rad) * encoder_rad
     temperature = np.round(joint.temperature_c, 1)
     return Recorded(joint, current, position, temperature, noise_a, encoder_rad)
+
+
+def scaled(
+    effect: str, joint: Joint, rng: np.random.Generator, strength: float, noise_a: float
+) -> Floats:
+    """Return an effect's current, as large as asked for."""
+    wanted, path = strength * noise_a, joint.path
+    if effect == "time_delay":
+        lengths = np.unique(np.geomspace(1, max(0.1 * path.rate_hz, 2), 30).round())
+        shapes = [EFFECTS[effect](joint, rng, length) for length in lengths]
+        sizes = [max(rest(shape, path), 1e-12) / wanted for shape in shapes]
+        nearest = int(np.argmin(np.abs(np.log(sizes))))
+        if not 1 / 3 < sizes[nearest] < 3:
+            msg = f"no delay leaves {strength:g} times the noise: {strength * sizes[nearest]:.2g}"
+            raise ValueError(msg)
+        return shapes[nearest]
+    shape = EFFECTS[effect](joint, rng, strength)
+    scale = wanted / rest(shape, path)
+    inertia = np.abs(joint.parts["inertia"]).max() / np.abs(path.acceleration).max()
+    if effect == "elasticity" and scale > inertia:
+        msg = (
+            f"of {strength:g} times the noise the load has {scale / inertia:.2g} times the inertia"
+        )
+        raise ValueError(msg)
+    return np.asarray(scale * shape)
 
 
 def rest(shape: Floats, path: Path) -> float:
