@@ -214,8 +214,7 @@ def turned(compared: Compared, terms: Sequence[Term]) -> Compared:
         strong = np.abs(current) > WEAK * np.std(current[grid.fit])
         edges = np.diff(np.stack([strong, grid.fit, track.group])) != 0
         piece = np.append(0, np.cumsum(edges.any(axis=0)))
-        product = np.bincount(piece, grid.fit * current * model)
-        power = np.bincount(piece, grid.fit * (current**2 + model**2))
-        other = strong & (power + 2 * product < CLEARLY * (power - 2 * product))[piece]
-        tracks.append(replace(track, current_a=np.where(other, -current, current)))
+        same, other = (np.bincount(piece, grid.fit * (current + k * model) ** 2) for k in (-1, 1))
+        wrong = strong & (other < CLEARLY * same)[piece]
+        tracks.append(replace(track, current_a=np.where(wrong, -current, current)))
     return compared.along(tracks, late)

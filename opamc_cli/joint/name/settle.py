@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from operator import itemgetter
 
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.name.chain import EXACT, HALF, PRICE, Chain, chain_of, extended, without
@@ -82,22 +81,19 @@ def lowering(chain: Chain) -> Chain:
     A name goes if it takes no more beside the other names alone: functions hold most of them.
     """
     while chain.added:
-        rises = []
-        for place, term in enumerate(chain.terms):
-            fewer = without(chain, place)
-            rise = _rise(fewer, chain)
-            if rise < 0 and not term.effect.unnamed:
-                rise = max(rise, _rise(only_named(fewer), only_named(chain)))
-            rises.append((rise, fewer))
-        rise, fewer = min(rises, key=itemgetter(0))
-        if rise >= 0:
+        fewer = [without(chain, place) for place in range(chain.added)]
+        rises = [_rise(*both, chain) for both in zip(fewer, chain.terms, strict=True)]
+        if min(rises) >= 0:
             break
-        chain = fewer
+        chain = fewer[rises.index(min(rises))]
     return chain
 
 
-def _rise(fewer: Chain, chain: Chain) -> float:
-    return fewer.fit.rmse(sealed=False) - (1 + PRICE / 2) * chain.fit.rmse(sealed=False)
+def _rise(fewer: Chain, term: Term | None, chain: Chain) -> float:
+    rise = fewer.fit.rmse(sealed=False) - (1 + PRICE / 2) * chain.fit.rmse(sealed=False)
+    if rise >= 0 or term is None or term.effect.unnamed:
+        return rise
+    return max(rise, _rise(only_named(fewer), None, only_named(chain)))
 
 
 def only_named(chain: Chain) -> Chain:
