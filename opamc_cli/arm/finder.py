@@ -19,12 +19,16 @@ with a spherical wrist, of seven axes; planar ones. Those that are found may be 
 MOST_AXES = len(STARTS[0])
 WAYS = dict(zip("xyzXYZ", np.vstack([np.eye(3), 0 - np.eye(3)]).tolist(), strict=True))
 """A capital letter's axis turns the other way."""
-SAMPLES, BLOCKS = 500, 6
-"""Looked at; left out in turn."""
+SAMPLES, FEWEST, BLOCKS = 500, 250, 6
+"""Looked at; needed, ten seconds at 25 Hz; left out in turn."""
 FITTED, ROUGH, FINE = 6, 3, 8
 """So many of the best words without lengths get some, in so many steps, the best of them finer."""
-RIDGE, LONG = 1e-7, 0.02
-"""Of links' parameters, in the current's deviation; of ways from axis to axis (m), zeros (rad)."""
+RIDGES = (1e-7, 1e-5, 1e-3)
+"""Of links' parameters, in the current's deviation: blocks left out are predicted by the best, for
+each joint by itself. By the least alone those of a measured arm's twenty seconds are extrapolated,
+and its last axis is found along x; by the largest the wrists of simulated ones are lost."""
+LONG = 0.02
+"""Likewise, of ways from axis to axis (m) and zeros (rad)."""
 
 
 class Finder:
@@ -39,7 +43,8 @@ class Finder:
 
     def __init__(self, motion: Floats, current: Floats) -> None:
         """Take angles, speeds and accelerations, (3, joints, n), and currents, (joints, n)."""
-        some = np.linspace(0, motion.shape[2] - 1, SAMPLES).astype(int)
+        n = motion.shape[2]
+        some = np.linspace(0, n - 1, min(SAMPLES, n)).astype(int)
         self.motion = motion[:, :, some]
         self.known: dict[tuple[str, bytes], Floats] = {}
         self.joints = {}
@@ -56,7 +61,8 @@ class Finder:
                 weight = np.sin(q[moves]), np.cos(q[moves])
                 alone.append(_held_out(np.column_stack([own, *weight]), y))
         self.alone = np.array(alone)
-        """Share of each one's mean square that it leaves in blocks left out without an arm."""
+        """Share of each one's mean square that it leaves in blocks left out without an arm, by each
+        ridge; (joints that move, ridges)."""
 
     def found(self) -> tuple[str, Floats]:
         """Return the axes' letters, and the way to each and its zero, (joints, 4).
@@ -72,11 +78,16 @@ class Finder:
         tried = [words[score] for score in sorted(words)[:FITTED]]
         ways = {word: self.fitted(word, none, ROUGH) for word in tried}
         word = min(tried, key=lambda one: self.score(one, ways[one]))
-        best, found = "", ways[word]
-        while word != best:
-            best, found = word, self.fitted(word, found, FINE)
-            word = self.exchanged(best, found)
-        return best, found
+        best, ways_of_best, least, found = "", none, np.inf, ways[word]
+        while (
+            word != best
+        ):  # Where nothing fits, what is exchanged leaves no less once it is fitted.
+            found = self.fitted(word, found, FINE)
+            if self.score(word, found) >= least:
+                break
+            best, ways_of_best, least = word, found, self.score(word, found)
+            word = self.exchanged(word, found)
+        return best, ways_of_best
 
     def score(self, letters: str, ways: Floats) -> float:
         """Sum the logarithms of what is left of each joint's current."""
@@ -88,7 +99,7 @@ class Finder:
         if key not in self.known:
             designs = self._designs(letters, ways)
             pairs = zip(designs, self.joints.values(), strict=True)
-            self.known[key] = np.array([_held_out(x, y) for x, (_, _, y) in pairs])
+            self.known[key] = np.array([_held_out(x, y).min() for x, (_, _, y) in pairs])
         return self.known[key]
 
     def exchanged(self, letters: str, ways: Floats) -> str:
@@ -109,7 +120,7 @@ class Finder:
             designs = self._designs(letters, free.reshape(-1, 4))
             found = [LONG * free]
             for x, size, (_, _, y) in zip(designs, sizes, self.joints.values(), strict=True):
-                held = np.linalg.solve(x.T @ x + RIDGE * len(y) * np.eye(x.shape[1]), x.T @ y)
+                held = np.linalg.solve(x.T @ x + RIDGES[0] * len(y) * np.eye(x.shape[1]), x.T @ y)
                 found.append((y - x @ held) / (size * np.sqrt(len(y))))
             return np.concatenate(found)
 
@@ -149,13 +160,16 @@ def _friction(q: Floats, v: Floats, a: Floats) -> Floats:
     return np.asarray(own / (np.sqrt(np.mean(own**2, axis=0)) + 1e-9))
 
 
-def _held_out(x: Floats, y: Floats) -> float:
-    """Mean square of what blocks that are left out in turn keep."""
+def _held_out(x: Floats, y: Floats) -> Floats:
+    """Mean square of what blocks that are left out in turn keep, by each ridge; (ridges,)."""
     block = np.arange(len(y)) * BLOCKS // len(y)
     parts = [(x[block == k], y[block == k]) for k in range(BLOCKS)]
     grams = np.stack([a.T @ a for a, _ in parts])
     moments = np.stack([a.T @ b for a, b in parts])
-    ridge = RIDGE * len(y) * np.eye(x.shape[1])
-    held = np.linalg.solve(grams.sum(0) + ridge - grams, (moments.sum(0) - moments)[:, :, None])
-    rest = [b - a @ own[:, 0] for (a, b), own in zip(parts, held, strict=True)]
-    return float(np.mean(np.concatenate(rest) ** 2)) + 1e-8
+    others, more = moments.sum(0) - moments, len(y) * np.eye(x.shape[1])
+    left = []
+    for ridge in RIDGES:
+        held = np.linalg.solve(grams.sum(0) + ridge * more - grams, others[:, :, None])
+        rest = [b - a @ own[:, 0] for (a, b), own in zip(parts, held, strict=True)]
+        left.append(np.mean(np.concatenate(rest) ** 2))
+    return np.array(left) + 1e-8

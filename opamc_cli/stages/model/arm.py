@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 from threadpoolctl import threadpool_limits
 
-from opamc_cli.arm.finder import MOST_AXES, SAMPLES, Finder, chain_of
+from opamc_cli.arm.finder import FEWEST, MOST_AXES, SAMPLES, Finder, chain_of
 from opamc_cli.config.joint_model import ARM, ArmConfig, ArmJoint, JointModelConfig
 from opamc_cli.config.yaml.values import yaml_of
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError, UsageError
@@ -23,14 +23,15 @@ from opamc_cli.storage.runs.run import Run
 
 WINDOW_S = 0.06
 """Motion and current are differentiated and smoothed so."""
-LEAST_GAIN = 4.0
+LEAST_GAIN = 5.0
 """How many times less half of the joints leave of their currents, in blocks left out, than without
-an arm: 6 to 110 times in 26 simulated programs of ten arms, 1.9 and 3.7 in two whose payload
+an arm: 6 to 110 times in 26 simulated programs of ten arms, 1.9 and 4.0 in two whose payload
 changes; 1.3 in two measured ones of two seconds each, 1.0 to 2.0 where joints that ask nothing of
 each other move."""
 SHORT = 2.0
-"""Deviations by which half of the joints by themselves miss blocks left out, above which a program
-is too short to tell an arm: 1.04 at the most in those, 3.5 and 6.1 in each of the measured."""
+"""Deviations by which half of the joints by themselves miss blocks left out, with the least ridge,
+above which a program is too short to tell an arm: 1.04 at the most in those, 3.5 and 6.1 in each of
+the measured."""
 REMEDY = (
     "give a longer program in which all axes move and the payload stays, or write the joints as a "
     "robot's URDF has them"
@@ -114,15 +115,17 @@ def _found(motion: Floats, current: Floats, fewest: int, named: Path, part: str)
     with threadpool_limits(1):  # With more, sums of products would differ in the last digit.
         finder = Finder(motion, current)
         alone = np.sqrt(finder.alone)
-        if alone.size < fewest:
-            msg = f"{named}: {alone.size} axes with a current move, {fewest} are needed"
+        if len(alone) < fewest:
+            msg = f"{named}: {len(alone)} axes with a current move, {fewest} are needed"
             raise InputError(msg)
-        if np.median(alone) > SHORT:
+        if np.median(alone[:, 0]) > SHORT:
             msg = f"{named}: is too short to tell where the joints are; {REMEDY}"
             raise NotEnoughDataError(msg)
         letters, ways = finder.found()
     shares, axes = np.sqrt(finder.left(letters, ways)), [joint + 1 for joint in finder.joints]
-    left, without = (dict(zip(axes, one.tolist(), strict=True)) for one in (shares, alone))
+    left, without = (
+        dict(zip(axes, one.tolist(), strict=True)) for one in (shares, alone.min(axis=1))
+    )
     chain = chain_of(letters, ways)
     joints = tuple(
         ArmJoint(xyz=_rounded(one.xyz), rpy=_rounded(one.rpy), axis=_rounded(one.axis))
@@ -226,8 +229,8 @@ def _logged(runs: Sequence[Run]) -> tuple[Floats, Floats]:
     motion, current = np.concatenate(motions, axis=2), np.concatenate(currents, axis=1)
     fastest = np.abs(motion[1]).max(axis=1)
     moving = (np.abs(motion[1]) > SLOWEST_SHARE * fastest[:, None]).any(axis=0)
-    if np.count_nonzero(moving) < SAMPLES:
-        msg = f"{first}: {np.count_nonzero(moving)} samples of motion, {SAMPLES} are needed"
+    if np.count_nonzero(moving) < FEWEST:
+        msg = f"{first}: {np.count_nonzero(moving)} samples of motion, {FEWEST} are needed"
         raise InputError(msg)
     return motion[:, :, moving], current[:, moving]
 

@@ -12,7 +12,7 @@ from opamc_cli.__main__ import main
 from opamc_cli.config.joint_model import ArmConfig, ArmJoint, load_joint_model
 from opamc_cli.stages.model.arm import FoundArm
 
-sys.path.append(str(Path(__file__).parents[2] / "robot" / "arm"))
+sys.path.append(str(Path(__file__).parents[2] / "arm"))
 import arms
 
 
@@ -62,8 +62,8 @@ def test_an_arm_is_found_beside_a_payload_that_changes(tmp_path, capsys):
         (2, 3, 2000, True, 3, "holds axes 2, 3, 4; an arm of axes 1 to n, of 7 at most"),
         (1, 8, 2000, True, 3, "holds axes 1, 2, 3, 4, 5, 6, 7, 8; an arm of axes 1 to n, of 7"),
         (1, 3, 12, True, 3, "12 samples are known on all axes: too few"),
-        (1, 3, 2000, False, 3, "0 samples of motion, 500 are needed"),
-        (1, 3, 60, True, 3, "46 samples of motion, 500 are needed"),
+        (1, 3, 2000, False, 3, "0 samples of motion, 250 are needed"),
+        (1, 3, 60, True, 3, "46 samples of motion, 250 are needed"),
         (1, 0, 2000, True, 3, "from the positions and currents of all axes"),
     ],
 )
