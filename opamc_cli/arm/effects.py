@@ -56,10 +56,15 @@ class ArmPayload(PayloadChange):
     def __init__(self, chain: KinematicChain) -> None:
         self.chain = chain
 
+    def untestable(self, track: Track) -> str | None:
+        """Nor does it show in an upright joint that carries it around no point but its own."""
+        why = super().untestable(track)
+        asks = why is not None or _asked(self.chain, track, np.arange(1), WEIGHT).size
+        return why if asks else "a weight in the gripper asks nothing of this joint"
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Return what a weight in the gripper asks of this joint while it is there."""
         held = np.hypot(*super().columns(track, parameters)[:, :2].T)
-
         asked = _asked(self.chain, track, np.arange(track.size), WEIGHT)
         return np.asarray(held[:, None] * asked)
 

@@ -8,7 +8,7 @@ import pytest
 
 from opamc_cli.__main__ import main
 from opamc_cli.arm.effects import arm_effects
-from opamc_cli.arm.torques import torques
+from opamc_cli.arm.torques import JointPlace, KinematicChain, torques
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint
@@ -80,6 +80,14 @@ def test_an_arm_asks_for_all_of_its_axes():
     assert np.linalg.matrix_rank(effect.columns(known, {})) == columns.shape[1]
     with pytest.raises(ConfigError, match="those of axes 1, 2, 3, 5: log all"):
         effect.columns_at(track((1, 2, 3, 5)), {}, rows)
+
+
+def test_a_weight_that_asks_nothing_of_an_upright_joint_is_not_sought():
+    known = track((1, 2, 3, 5, 6))
+    upright = JointPlace((0.0, 0.0, 0.1), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    payload = arm_effects(KinematicChain((upright,) * 6))["payload_change"]
+    assert payload.untestable(known) == "a weight in the gripper asks nothing of this joint"
+    assert "asks nothing" not in str(arm_effects(arms.chain())["payload_change"].untestable(known))
 
 
 def test_base_parameters_hold_all_that_links_ask():

@@ -783,19 +783,24 @@ def test_of_a_negative_that_is_driven_as_well_the_sign_is_not_turned(tmp_path, m
         assert bool(closed.get("opposite_sign")) == said
 
 
-@pytest.mark.long
-def test_of_a_joint_whose_dry_friction_resists_the_sign_is_not_turned(tmp_path, capsys):
-    """A measured arm's fourth joint moved in step with what the others asked of it."""
+def closed_beside(tmp_path, capsys, inertia, viscous=0.0, coulomb=0.0):
+    """Close a joint beside another that loads it; what is said of it."""
     t = np.arange(3000) / 125.0
     q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
     speed = np.gradient(q) * 125
-    current = 0.5 * np.sin(q) + 0.2 * np.sign(speed) + 4 * np.cos(q + beside)
-    current -= 0.4 * speed + 0.2 * np.gradient(speed) * 125
+    current = 0.5 * np.sin(q) + coulomb * np.sign(speed) + 4 * np.cos(q + beside)
+    current += viscous * speed + inertia * np.gradient(speed) * 125
     current += 0.02 * np.random.default_rng(1).normal(size=t.size)
     columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
     write_run(tmp_path / "run.parquet", 125.0, **columns)
     assert close(tmp_path, "--axis", "1", model=MODEL) == 0
-    said = capsys.readouterr().err
+    return capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_of_a_joint_whose_dry_friction_resists_the_sign_is_not_turned(tmp_path, capsys):
+    """A measured arm's fourth joint moved in step with what the others asked of it."""
+    said = closed_beside(tmp_path, capsys, inertia=-0.2, viscous=-0.4, coulomb=0.2)
     assert "the opposite sign of its motion" not in said
     assert "the declared viscous drives the joint instead of resisting" in said
 
@@ -803,15 +808,7 @@ def test_of_a_joint_whose_dry_friction_resists_the_sign_is_not_turned(tmp_path, 
 @pytest.mark.long
 def test_by_an_inertia_just_below_0_the_sign_is_not_turned(tmp_path, capsys):
     """A measured arm's sixth joint had one, and friction that told nothing."""
-    t = np.arange(3000) / 125.0
-    q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
-    acceleration = np.gradient(np.gradient(q)) * 125**2
-    current = 0.5 * np.sin(q) + 4 * np.cos(q + beside) - 0.002 * acceleration
-    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
-    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
-    write_run(tmp_path / "run.parquet", 125.0, **columns)
-    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
-    said = capsys.readouterr().err
+    said = closed_beside(tmp_path, capsys, inertia=-0.002)
     assert "friction would drive the joint" not in said
     assert "axis 1: the declared inertia is below 0" in said
 

@@ -121,7 +121,7 @@ def _laid_out(
     compared = turned(compared, terms)
     late = compared.after
     if np.count_nonzero(~late) < 2 or not late.any():
-        return "too few cycles or recordings whose torque axis can be followed"
+        return "too few cycles or recordings with enough motion"
     if not compared.sums(()).power[~late].any():
         return "no current in the baseline"
     population = learn(compared, terms, SESSIONS_DIFFER if cycles else 0.0)

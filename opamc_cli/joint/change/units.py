@@ -204,8 +204,8 @@ def turned(compared: Compared, terms: Sequence[Term]) -> Compared:
     if late.all() or "logged" in compared.track.channels:
         return compared
     sums, own = compared.sums(terms), own_fit(compared, terms)[0][~late]
-    shares = [sums.left(np.tile(one, (late.size, 1)))[~late] / sums.power[~late] for one in own]
-    usual = own[int(np.argmin(np.median(shares, axis=1)))]
+    left = np.array([sums.left(np.tile(one, (late.size, 1))) for one in own])[:, ~late]
+    usual = own[int(np.argmin(np.median(left / np.maximum(sums.power[~late], 1e-300), axis=1)))]
     tracks = []
     for fine, grid in ((True, compared.dataset.fine), (False, compared.dataset.coarse)):
         track = grid.track
