@@ -539,3 +539,14 @@ def test_an_inertia_that_one_stretch_of_a_single_stroke_shows_has_its_name():
     assert [step.term.effect.name for step in loop.steps if step.named] == ["inertia"]
     assert [step.trial.why_not for step in loop.steps if step.named] == [None]
     assert loop.rmse_after_a < 0.5 * loop.rmse_before_a
+
+
+@pytest.mark.parametrize("number", [73500019, 74000019])
+def test_an_inertia_of_a_slow_stroke_is_missing(number):
+    """Over 0.2 s, which the noise of the whole stroke asks for, no sample of its ramps counted."""
+    made = servo_joint.record(number, "inertia", 15.0, "single", 250.0)
+    recording = Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
+    loop = close(recording, made.declared)
+    assert loop.verdict != "nothing-missing"
+    assert loop.rmse_before_a > 10 * made.noise_a
+    assert loop.rmse_after_a < 0.25 * loop.rmse_before_a

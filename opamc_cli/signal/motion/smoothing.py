@@ -77,19 +77,23 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     """Shortest odd window whose derivative noise is small against the derivative itself.
 
     Of a position (derivative 2) or a speed (1), shape (n,): 3 samples or more, at most 0.2 s or 15
-    samples.
+    samples. Where no window does, as where next to all of the way goes at one speed, the noise is
+    held against the derivative where there is one: its mean square weighted by its square.
     """
     longest = max(int(LONGEST_WINDOW_S * rate_hz) | 1, LONGEST_WINDOW)
     longest = min(longest, (path.size - 1) | 1)
     noise = measurement_noise(path)
-    window = SHORTEST_WINDOW
+    window, of_ramps = SHORTEST_WINDOW, longest
     while window < longest:
         values = derivatives(path, rate_hz, window, derivative)
-        own = noise * noise_gain(rate_hz, window, derivative)
-        if own <= ALLOWED_NOISE_SHARE * float(np.std(values)):
-            break
+        own = noise * noise_gain(rate_hz, window, derivative) / ALLOWED_NOISE_SHARE
+        squares = (values - values.mean()) ** 2
+        if own**2 <= float(squares.mean()):
+            return window
+        if own**2 * float(squares.sum()) <= float(squares @ squares):
+            of_ramps = min(of_ramps, window)
         window = int(window * 1.3 + 2) | 1
-    return max(min(window, longest), SHORTEST_WINDOW)
+    return max(of_ramps, SHORTEST_WINDOW)
 
 
 def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | Ints = 0) -> Floats:

@@ -78,6 +78,21 @@ def test_clean_paths_get_the_shortest_window_and_noisy_ones_a_longer():
     assert smoothing_window(noisy, 1000.0) > 21
 
 
+def slow_stroke(noise_rad):
+    """Nearly all of it at one speed; ramps of 0.1 s of which a window of 0.2 s leaves nothing."""
+    t = np.arange(12_000) / 250.0
+    ramps = np.clip(np.minimum(t, t[-1] - t) / 0.1, 0, 1)
+    path = 0.05 * np.cumsum(ramps) / 250.0
+    return path + np.random.default_rng(3).normal(size=t.size) * noise_rad
+
+
+def test_a_slow_stroke_gets_a_window_in_which_its_ramps_are_left():
+    longest = int(0.2 * 250.0) | 1
+    assert smoothing_window(slow_stroke(1e-5), 250.0) < 0.6 * longest
+    # Noise that hides the ramps themselves asks for all that is allowed.
+    assert smoothing_window(slow_stroke(1e-4), 250.0) == longest
+
+
 def test_noise_of_a_quantised_path_at_high_rate_is_not_the_rounding_of_the_computer():
     # A hundred samples per step of the encoder: most fourth differences are rounding alone.
     path = np.round(np.linspace(0.3, 0.4, 20_000) / 5e-4) * 5e-4
