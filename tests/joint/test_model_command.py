@@ -26,6 +26,7 @@ from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.stages.model import model as stage
+from opamc_cli.stages.model.axis_model import too_little_motion
 
 MODEL = (
     "joint: {gear_ratio: null, pole_pairs: null}\neffects: [inertia, gravity, coulomb, viscous]\n"
@@ -513,6 +514,19 @@ def test_a_position_whose_values_are_held_is_not_said_to_rest(folder, capsys):
     said = capsys.readouterr().err
     assert "changes in 7% of the samples alone and stands still between" in said
     assert "does not move" not in said
+
+
+def test_phases_without_current_for_seconds_are_said_to_tell_no_motion():
+    """It was too little motion, and more of it was asked for."""
+    made = simulate(3, (), 0.0, rate=250.0, cycles=6)
+    one = Recording("run", 250.0, current_a=made.current, position_rad=made.position)
+    track, _ = grouped_track([one], Joint())
+    lost = replace(track, moving=np.zeros_like(track.moving), guessed_s=(0.1, 2.37))
+    said = str(too_little_motion(lost, 1, "run", 50))
+    assert "for 2.4 s at a time there is too little current to see it" in said
+    assert "log the position" in said
+    assert "record at least" not in said
+    assert "record at least" in str(too_little_motion(replace(lost, guessed_s=()), 1, "run", 50))
 
 
 @pytest.mark.parametrize("samples", [150, 75])

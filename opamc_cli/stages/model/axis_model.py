@@ -334,4 +334,10 @@ def too_little_motion(track: Track, axis: int, named: str, fewest: int) -> NotEn
             f"{named}: the position of axis {axis} changes in {share:.0%} of the samples alone "
             "and stands still between: is each value held? Log it at its own rate"
         )
+    elif track.guessed_s:
+        msg = (
+            f"{named}: the phase currents of axis {axis} do not tell its motion: for "
+            f"{max(track.guessed_s):.2g} s at a time there is too little current to see it, and the "
+            "followed speed runs away; log the position"
+        )
     return NotEnoughDataError(msg)
