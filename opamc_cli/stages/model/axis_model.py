@@ -337,7 +337,7 @@ def too_little_motion(track: Track, axis: int, named: str, fewest: int) -> NotEn
     elif track.guessed_s:
         msg = (
             f"{named}: the phase currents of axis {axis} do not tell its motion: for "
-            f"{max(track.guessed_s):.2g} s at a time there is too little current to see it, and the "
-            "followed speed runs away; log the position"
+            f"{max(track.guessed_s):.2g} s at a time there is too little current to see it, and "
+            "the followed speed runs away; log the position"
         )
     return NotEnoughDataError(msg)
