@@ -143,12 +143,12 @@ def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> boo
     but for one that still takes half of it beside the function: that explains something else. A
     name that holds nine tenths of what it explains stays: the rest is asked for beside it.
     """
-    difference, error = paired(rival.deviation, best.deviation)
     if term.effect.fast and term.effect.domain != "acceleration":
+        difference, error = paired(rival.deviation, best.deviation)
         alike = rival.score < best.score + LEAST_SHARE and difference > -LEAST_T * error
         kept = HALF * (parent.score - best.score)
         return alike and rival.score - extended(rival, term).score < kept
-    if rival.score >= best.score - LEAST_SHARE or difference <= LEAST_T * error:
+    if rival.score >= best.score - LEAST_SHARE:
         return False
     named, explained = (parent.mean_square - one.mean_square for one in (best, rival))
     if named >= EXACT * explained:
