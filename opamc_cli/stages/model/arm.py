@@ -74,6 +74,17 @@ class FoundArm:
         return float(np.median([self.alone[axis] / self.left[axis] for axis in self.left]))
 
 
+class MisnumberedError(InputError):
+    """Axes that move, but are not numbered from an arm's base on."""
+
+    def __init__(self, run: Path, axes: Sequence[int]) -> None:
+        self.why = (
+            f"an arm of axes 1 to n, of {MOST_AXES} at most, is found, not one of axes "
+            + ", ".join(map(str, axes))
+        )
+        super().__init__(f"{run}: {self.why}: number them so from the base on")
+
+
 def find_arm(paths: Runs, fewest: int = 2) -> FoundArm:
     """Find where the joints of an arm are, from positions and currents of all of its axes.
 
@@ -86,14 +97,16 @@ def find_arm(paths: Runs, fewest: int = 2) -> FoundArm:
 
     Raises
     ------
+    MisnumberedError
+        If so many axes move, but are not axes 1 to n.
     InputError
-        If they do not hold axes 1 to n with currents, or do not move.
+        If they do not hold positions and currents of the axes, or do not move.
     NotEnoughDataError
         If they do not tell where the joints are.
     """
     with ExitStack() as stack:
         runs = [stack.enter_context(Run(path, name)) for name, path in paths]
-        motion, current = _logged(runs)
+        motion, current = _logged(runs, fewest)
     named, n = paths[0][1], motion.shape[2]
     whole = found = _found(motion, current, fewest, named, "whole")
     for part, (first, last) in PARTS.items() if n >= 3 * SAMPLES else ():
@@ -148,6 +161,8 @@ def arm_told(model: JointModelConfig, paths: Runs) -> FoundArm | str | None:
         return find_arm(paths, FEWEST_AXES)
     except NotEnoughDataError:
         return UNTOLD
+    except MisnumberedError as error:
+        return error.why
     except OpamcError:  # Which the work on the axes says, too.
         return None
 
@@ -196,19 +211,13 @@ def _rounded(vector: Sequence[float]) -> Any:
     return tuple(round(value, 4) + 0.0 for value in vector)
 
 
-def _logged(runs: Sequence[Run]) -> tuple[Floats, Floats]:
+def _logged(runs: Sequence[Run], fewest: int) -> tuple[Floats, Floats]:
     """Motion of all axes, (3, axes, n), and their currents, (axes, n), of runs."""
     axes = sorted(set.intersection(*(set(run.positions) for run in runs)))
     fed = [axis for axis in axes if all(f"axis{axis}_current" in run.columns for run in runs)]
     first = runs[0].path
     if len(fed) < max(len(axes) / 2, 2):
         msg = f"{first}: an arm is found from the positions and currents of all axes: log them"
-        raise InputError(msg)
-    if axes != list(range(1, len(axes) + 1)) or len(axes) > MOST_AXES:
-        msg = (
-            f"{first}: holds axes {', '.join(map(str, axes))}; an arm of axes 1 to n, of "
-            f"{MOST_AXES} at most, is found: number them so from the base on"
-        )
         raise InputError(msg)
     motions, currents = [], []
     for run, start, stop in _pieces(runs):
@@ -232,6 +241,10 @@ def _logged(runs: Sequence[Run]) -> tuple[Floats, Floats]:
     if np.count_nonzero(moving) < FEWEST:
         msg = f"{first}: {np.count_nonzero(moving)} samples of motion, {FEWEST} are needed"
         raise InputError(msg)
+    moves = np.ptp(motion[0], axis=1) > SLOWEST_SHARE * np.ptp(motion[0], axis=1).max()
+    misnumbered = axes != list(range(1, len(axes) + 1)) or len(axes) > MOST_AXES
+    if misnumbered and np.count_nonzero(moves & np.isin(axes, fed)) >= fewest:
+        raise MisnumberedError(first, axes)
     return motion[:, :, moving], current[:, moving]
 
 

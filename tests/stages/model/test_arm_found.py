@@ -59,8 +59,15 @@ def test_an_arm_is_found_beside_a_payload_that_changes(tmp_path, capsys):
     ("first", "axes", "samples", "moving", "code", "said"),
     [
         (1, 3, 2000, True, 5, "does not tell where the joints are"),
-        (2, 3, 2000, True, 3, "holds axes 2, 3, 4; an arm of axes 1 to n, of 7 at most"),
-        (1, 8, 2000, True, 3, "holds axes 1, 2, 3, 4, 5, 6, 7, 8; an arm of axes 1 to n, of 7"),
+        (
+            2,
+            3,
+            2000,
+            True,
+            3,
+            "an arm of axes 1 to n, of 7 at most, is found, not one of axes 2, 3, 4:",
+        ),
+        (1, 8, 2000, True, 3, "is found, not one of axes 1, 2, 3, 4, 5, 6, 7, 8: number"),
         (1, 3, 12, True, 3, "12 samples are known on all axes: too few"),
         (1, 3, 2000, False, 3, "0 samples of motion, 250 are needed"),
         (1, 3, 60, True, 3, "46 samples of motion, 250 are needed"),
@@ -143,6 +150,22 @@ def test_a_close_says_that_runs_do_not_tell_of_an_arm(tmp_path, capsys):
     said, loop, written = close(tmp_path, capsys, run, "without: []\n")
     assert "do not tell where the arm's joints are" in said
     assert "arm" not in {*loop["declared"], *written}
+
+
+@pytest.mark.parametrize("moving", [4, 1])
+def test_a_close_says_why_no_arm_is_sought(tmp_path, capsys, moving):
+    """Axes counted from 2 were closed with couplings, and nobody was told."""
+    t = np.arange(3000) / 100.0
+    columns = {}
+    for k in range(4):
+        angle = np.sin((2 + 0.3 * k) * t) * (k < moving)
+        friction = np.sign(np.gradient(angle)) + 0.05 * np.random.default_rng(k).normal(size=t.size)
+        columns |= {f"axis{k + 2}_current": friction, f"axis{k + 2}_position": angle}
+    run = arms.saved(tmp_path / "run.parquet", 100.0, columns)
+    said, loop, _ = close(tmp_path, capsys, run, "without: []\n", axis=2)
+    why = "an arm of axes 1 to n, of 7 at most, is found, not one of axes 2, 3, 4, 5"
+    assert (why in said) == (moving == 4)
+    assert any(why in note for note in loop["notes"]) == (moving == 4)
 
 
 @pytest.mark.parametrize(
