@@ -28,6 +28,9 @@ LATE_SHARE = 0.1
 """Of what a logged speed differs by from the position's, that its lag must explain: a stranger's 71
 filtered speeds 0.2 or more; of 20 measured joints, which show none, 0.03 at most."""
 ALLOWED_NOISE_SHARE = 0.01
+RAMPS_SHARE = 2 / 3
+"""Of the longest window: one that is hardly shorter leaves of a ramp as little, but is another draw
+of what is found (a sweep of 2 s, in the sum of six declared models 4.48 -> 4.77 A)."""
 LONG_WINDOW = 127
 """Samples from which on Fourier transforms are faster than sums over the window: of 245 000 samples
 20 ms instead of 50 with 245 of them, 170 with 735; they differ by 4e-13 of the result."""
@@ -78,7 +81,8 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
 
     Of a position (derivative 2) or a speed (1), shape (n,): 3 samples or more, at most 0.2 s or 15
     samples. Where no window does, as where next to all of the way goes at one speed, the noise is
-    held against the derivative where there is one: its mean square weighted by its square.
+    held against the derivative where there is one (its mean square weighted by its square), if
+    that makes it much shorter.
     """
     longest = max(int(LONGEST_WINDOW_S * rate_hz) | 1, LONGEST_WINDOW)
     longest = min(longest, (path.size - 1) | 1)
@@ -93,7 +97,7 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
         if own**2 * float(squares.sum()) <= float(squares @ squares):
             of_ramps = min(of_ramps, window)
         window = int(window * 1.3 + 2) | 1
-    return max(of_ramps, SHORTEST_WINDOW)
+    return max(of_ramps if of_ramps < RAMPS_SHARE * longest else longest, SHORTEST_WINDOW)
 
 
 def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | Ints = 0) -> Floats:
