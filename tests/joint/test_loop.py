@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import algebraic_joint
 import numpy as np
 import pytest
 import servo_joint
@@ -550,3 +551,14 @@ def test_an_inertia_of_a_slow_stroke_is_missing(number):
     assert loop.verdict != "nothing-missing"
     assert loop.rmse_before_a > 10 * made.noise_a
     assert loop.rmse_after_a < 0.25 * loop.rmse_before_a
+
+
+def test_one_name_that_holds_nearly_all_that_functions_do_keeps_its_place():
+    """A function of the travel since a reversal was a twelfth better, and took the name off."""
+    made = algebraic_joint.record("quintic", "hysteresis", 5.0, 70900111)
+    recording = Recording(
+        "run", made.joint.path.rate_hz, current_a=made.current_a, position_rad=made.position_rad
+    )
+    loop = close(recording)
+    assert [step.term.effect.name for step in loop.steps] == ["hysteresis"]
+    assert loop.verdict == "closed"

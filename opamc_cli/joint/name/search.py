@@ -218,11 +218,6 @@ def _best_with(chain: Chain, forms: Sequence[Term], *others: Chain) -> Chain:
     return min(children, key=lambda one: (not one.plausible_beside(chain), one.score))
 
 
-def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
-    """Return the trials that may be added."""
-    return [trial for trial in trials(chain, pool, known) if trial.why_not is None]
-
-
 def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
     """Guesses of each effect that follows the load and moves its zero: all are fitted."""
     dataset = chain.fit.dataset
@@ -277,7 +272,8 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS, steps: int = MOST_STEPS)
     best, width = start, 1 if "beam" in pool.without else width
     known: set[Signature] = set()
     for _ in range(steps):
-        following = [trial.chain for chain in chains for trial in _possible(chain, pool, known)]
+        tried = [trial for chain in chains for trial in trials(chain, pool, known)]
+        following = [trial.chain for trial in tried if trial.why_not is None]
         # One of each kind: two lines, or two places, are one idea.
         kinds: dict[tuple[str, ...], Chain] = {}
         for chain in sorted(following, key=lambda chain: chain.score):

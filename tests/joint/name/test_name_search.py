@@ -216,12 +216,15 @@ def test_of_chains_that_hold_the_same_effects_the_best_alone_is_followed(monkeyp
         SimpleNamespace(score=score, mean_square=1.0, terms=[called(name)]) for name, score in kinds
     ]
     start, asked = SimpleNamespace(score=0.0, mean_square=1.0, terms=[]), []
+    best = SimpleNamespace(score=-9.0, mean_square=1.0, terms=[called("hum")])
+    refused = SimpleNamespace(chain=best, why_not="takes nothing")
 
     def possible(chain, pool, known):
         asked.append(chain)
-        return [SimpleNamespace(chain=one) for one in made] if chain is start else []
+        added = [SimpleNamespace(chain=one, why_not=None) for one in made]
+        return [*added, refused] if chain is start else []
 
-    monkeypatch.setattr(search, "_possible", possible)
+    monkeypatch.setattr(search, "trials", possible)
     assert beam(start, Pool([], {}), 2) is made[0]
     assert asked == [start, made[0], made[2]]
 
@@ -236,9 +239,9 @@ def test_chains_are_followed_as_far_as_the_score_falls(monkeypatch, width):
 
     def possible(chain, pool, known):
         following = chains[chains.index(chain) + 1 :][:1]
-        return [SimpleNamespace(chain=one) for one in following]
+        return [SimpleNamespace(chain=one, why_not=None) for one in following]
 
-    monkeypatch.setattr(search, "_possible", possible)
+    monkeypatch.setattr(search, "trials", possible)
     assert beam(chains[0], Pool([], {}), width).score == -1.0
 
 
