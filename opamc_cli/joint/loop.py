@@ -167,8 +167,8 @@ def _closed(
     if able and "unnamed" not in without_rules and "alone" not in without_rules:
         alone = _without_names(start, named, unnamed)
         held, explained = (start.mean_square - c.mean_square for c in (only_named(final), alone))
-        # One name that holds nine tenths of what they do is no several ones for one thing.
-        holds = len(named) == 1 and held >= EXACT * explained
+        # One name that holds what they do, but for what nobody cares about, is the thing itself.
+        holds = len(named) == 1 and held >= (1 - LEAST_SHARE) * explained
         final = final if holds or alone.score >= final.score - LEAST_SHARE else alone
     final = lowering(final)
     final, names = released(final), released(only_named(final))
