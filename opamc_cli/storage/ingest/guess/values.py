@@ -46,6 +46,12 @@ ANGLE_UNITS = {
 RATES_HZ = (5.0, 20_000.0)
 """Rates at which arms are logged."""
 
+SLOWEST_HZ = 0.5
+"""Of stamps in seconds that may also be milliseconds: some machines log so slowly."""
+
+SHORTEST_S = 1.0
+"""Of a log: no motion is over sooner."""
+
 FASTEST_HZ = 1e6
 """Of stamps in seconds, which no other unit makes a log of: a drive's capture, a probe."""
 
@@ -159,9 +165,15 @@ def time_unit(stamps: Float) -> Guess | None:
             return Guess(unit, f"dates of {datetime.fromtimestamp(since_s, UTC).year}")
     if step == 1.0 and bool(np.all(known == np.round(known))):
         return Guess("samples", "counts rows")
+    why, slow = f"steps of {step:.6g}", SLOWEST_HZ <= rates["s"] < RATES_HZ[0]
     for unit in ("s", "ms", "us", "ns"):
         if RATES_HZ[0] <= rates[unit] <= RATES_HZ[1]:
-            return Guess(unit, f"steps of {step:.6g}")
+            lasts_s = float(np.ptp(known)) * CONVERSIONS["time"][unit].factor
+            if not slow:
+                return Guess(unit, why)
+            if lasts_s < SHORTEST_S:
+                return Guess("s", f"{why}, or {unit} if all of it lasts {lasts_s:.2g} s")
+            return Guess(unit, f"{why}, or s if it is logged at {rates['s']:.2g} Hz")
     return Guess("s", f"steps of {step:.6g}") if RATES_HZ[1] < rates["s"] <= FASTEST_HZ else None
 
 

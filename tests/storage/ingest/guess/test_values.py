@@ -138,8 +138,12 @@ def test_currents_of_more_than_sixty_are_in_milliampere():
 def test_rates_are_those_of_loggers():
     for rate, known in ((4.9, None), (5.0, 5.0), (20_000.0, 20_000.0), (21_000.0, None)):
         assert rate_from_speed({1: np.arange(50.0) / rate}, {1: np.ones(50)}) == known
-    for step, unit in ((0.19, "s"), (0.21, "ms"), (0.21e3, "us"), (5.1e-5, "s")):
+    for step, unit in ((0.19, "s"), (0.21e3, "us"), (5.1e-5, "s")):
         assert time_unit(np.arange(50) * step + 0.5).unit == unit, step
+    # five samples a second, or five a millisecond: nobody logs 10 ms of an arm
+    short, long = (time_unit(np.arange(n) * 0.21 + 0.5) for n in (50, 50_000))
+    assert (short.unit, short.why) == ("s", "steps of 0.21, or ms if all of it lasts 0.01 s")
+    assert (long.unit, long.why) == ("ms", "steps of 0.21, or s if it is logged at 4.8 Hz")
     # a servo's current at 20 kHz, whose steps are 4.99999e-05: "t fits no unit of time"
     for step in (50e-6 * (1 - 1e-9), 1e-5, 1.1e-6):
         assert time_unit(np.arange(50) * step + 0.5).unit == "s", step
