@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 State = Literal["healthy", "changed", "fault", "insufficient-data"]
 
-Method = Literal["sessions", "relabelled-sessions", "one-session", "none"]
+Method = Literal["sessions", "relabelled-sessions", "one-session", "cause", "none"]
 
 FAR = 20.0
 """Health index beyond which nothing is called healthy because other joints have moved as far:
@@ -142,7 +142,7 @@ class Judgement:
     witnesses: Mapping[str, float]
     """p-value by each witness alone, not corrected for the number of joints."""
     method: Method
-    """sessions, relabelled-sessions, one-session or none."""
+    """sessions, relabelled-sessions, one-session, none, or cause: what has changed in it tells."""
     unusual_log_ratio: float
     """Log of how unusual the target's conditions are, by its current's course; 0 if unknown."""
     unknown_change: float

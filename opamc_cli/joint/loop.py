@@ -166,10 +166,12 @@ def _closed(
     able = named and saturated[0].score < final.score - LEAST_SHARE
     if able and "unnamed" not in without_rules and "alone" not in without_rules:
         alone = _without_names(start, named, unnamed)
-        held, explained = (start.mean_square - c.mean_square for c in (only_named(final), alone))
-        # One name that holds what they do, but for what nobody cares about, is the thing itself.
-        holds = len(named) == 1 and held >= (1 - LEAST_SHARE) * explained
-        final = final if holds or alone.score >= final.score - LEAST_SHARE else alone
+        single = min((extended(start, one.term) for one in named), key=lambda one: one.score)
+        held, explained = (start.mean_square - one.mean_square for one in (single, alone))
+        if alone.score < final.score - LEAST_SHARE:
+            # One name that holds what they do, but for what nobody cares about, is the thing.
+            holds = held >= (1 - LEAST_SHARE) * explained
+            final = worth_their_price(beam(single, unnamed, width=1)) if holds else alone
     final = lowering(final)
     final, names = released(final), released(only_named(final))
     steps = _steps(start, final, named, shares, seed)
@@ -178,8 +180,7 @@ def _closed(
     told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    fits = before, names.fit, final.fit, best_before
-    loop = _opened(fits, saturated, steps, tried, library)
+    loop = _opened((before, names.fit, final.fit, best_before), saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
 
 

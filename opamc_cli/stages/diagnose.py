@@ -241,7 +241,7 @@ def _causes(
     list of str
         Which could not be sought, and why.
     """
-    differing = decided.differing(config.score) if config.joint.explain else []
+    differing = decided.differing() if config.joint.explain else []
     causes: dict[int, dict[str, Any]] = {}
     notes: list[str] = []
     if not differing:

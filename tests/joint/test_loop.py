@@ -185,16 +185,22 @@ def payload_of(made):
     return 8 * made.noise_rms * np.sin(made.position + 0.5)
 
 
-@pytest.mark.parametrize("since", [0.6, long(0.8)])
-def test_a_payload_that_changes_once_is_found(since):
+@pytest.mark.parametrize(
+    ("since", "until"), [(0.6, None), (0.35, 0.7), long(0.8, None), long(0.3, 0.9)]
+)
+def test_a_payload_that_changes_once_or_is_held_once_is_found(since, until):
     # From 0.8 on the last of five cycles alone knows the new payload.
     made = simulate(3, (), rate=250.0, cycles=5)
-    held = np.arange(made.current.size) >= round(since * made.current.size)
+    place = np.arange(made.current.size) / made.current.size
+    held = (place >= since) & (place < (until or 1.0))
     loop = close_recording(made, made.current + held * payload_of(made))[1]
     assert [step.term.effect.name for step in loop.steps] == ["payload_change"]
     # A twentieth of a cycle: the refinement ends where a slow stretch tells little.
-    found = loop.steps[0].term.parameters["since_s"]
-    assert abs(found - np.argmax(held) / made.rate_hz) < 0.05 * 7.3
+    ends = {"since_s": since} if until is None else {"since_s": since, "until_s": until}
+    seconds = made.current.size / made.rate_hz
+    expected = {name: pytest.approx(end * seconds, abs=0.05 * 7.3) for name, end in ends.items()}
+    assert loop.steps[0].term.parameters == expected
+    assert (until is None) != loop.steps[0].interpretation.startswith("a payload held from")
 
 
 @pytest.mark.long

@@ -18,6 +18,7 @@ UNITS = {
     "place_rad": "rad",
     "width_rad": "rad",
     "since_s": "s",
+    "until_s": "s",
     "gripped_s": "s",
     "released_s": "s",
     "delay_s": "s",

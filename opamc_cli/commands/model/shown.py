@@ -100,9 +100,12 @@ def _headline(result: Mapping[str, Any]) -> str:
         )
     if "verdict" not in result or "steps" not in result:
         return f"Axis {axis}: loop.json does not say what was found; close the loop again"
-    domain = result.get("domain")
-    what = functions or "something" + (f" in the {domain} domain" if domain else "")
-    return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}{fails}"
+    if not functions:
+        whole = "no effect of the library, nor a function without a name, holds what is left"
+        return f"Axis {axis}: {whole}: {error}{fails}"
+    return (
+        f"Axis {axis} lacks {functions}, which no effect of the library describes: {error}{fails}"
+    )
 
 
 def _as_logged(result: Mapping[str, Any]) -> str:

@@ -10,8 +10,8 @@ from opamc_cli.joint.motion.track import Floats, Track
 GUESSES, NEAR = 32, 4
 LEAST_SIDE = 0.03
 """Share of the open samples before or after the step."""
-RESTS = 8
-"""Most rests of a cycle between any two of which a payload may be held."""
+RESTS, EDGES = 8, 11
+"""Most rests of a cycle between any two of which a payload may be held; times, for once in all."""
 
 
 class PayloadChange(Effect):
@@ -23,7 +23,7 @@ class PayloadChange(Effect):
     of_its_recordings = True
     origin = "load"
     changes_in_time = True
-    searches = ("since_s", "gripped_s", "released_s", "per_kg")
+    searches = ("since_s", "until_s", "gripped_s", "released_s", "per_kg")
     meaning = "another payload: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
@@ -35,12 +35,15 @@ class PayloadChange(Effect):
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
-        first, last = _judgeable(track)
+        first, last = self.limits(track)["since_s"]
         # Where no recording comes back by itself, a step within one is a function of place.
-        times = track.starts_s[1 :: len(track.starts_s) // GUESSES + 1]
-        if not times.size or track.comes_back:
-            times = np.linspace(first, last, GUESSES)
-        steps = [{"since_s": float(time)} for time in times if first <= time <= last]
+        tried = track.starts_s[1 :: len(track.starts_s) // GUESSES + 1]
+        if not tried.size or track.comes_back:
+            tried = np.linspace(first, last, GUESSES)
+        times = [float(time) for time in tried if first <= time <= last]
+        steps = [{"since_s": time} for time in times]
+        edges = combinations(times[:: len(times) // EDGES + 1], 2)
+        steps += [{"since_s": one, "until_s": other} for one, other in edges]
         # Where phases follow the joint, half turns that are lost from rest to rest look the same.
         held = "logged" in track.channels and np.isfinite(track.period_s)
         pairs = combinations(_rests(track) if held else (), 2)
@@ -51,51 +54,60 @@ class PayloadChange(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anywhere in the session, but not so close to its ends that one side tells nothing."""
-        return {"since_s": _judgeable(track)}
+        rows = track.moving if track.open_samples is None else track.open_samples
+        first, last = np.quantile(track.time_s[rows], [LEAST_SIDE, 1 - LEAST_SIDE])
+        return dict.fromkeys(("since_s", "until_s"), (float(first), float(last)))
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """Half of the way between two of the times for once in all, and a little more."""
+        return {end: 0.6 * (b - a) / EDGES for end, (a, b) in self.limits(track).items()}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Gravity's and inertia's regressors after the step."""
-        place, since, until = track.time_s, parameters.get("since_s", 0.0), np.inf
+        place, since = track.time_s, parameters.get("since_s", 0.0)
+        until = parameters.get("until_s", np.inf)
         if "gripped_s" in parameters:
             place = track.run_time_s % track.period_s
             since, until = parameters["gripped_s"], parameters["released_s"]
         after = ((place >= since) & (place < until)).astype(float)
         if "per_kg" in parameters:
             after = np.zeros(track.size) if track.payload_kg is None else track.payload_kg
-        return stack(
-            after * np.sin(track.position_rad),
-            after * np.cos(track.position_rad),
-            after * track.acceleration,
-        )
+        asked = np.sin(track.position_rad), np.cos(track.position_rad), track.acceleration
+        return stack(*(after * one for one in asked))
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
-        """Where nothing open tells the time, take a recording's start, or the middle."""
+        """Where nothing open tells a time, take a recording's start, or the middle."""
         rows = track.open_samples
         if rows is None or "since_s" not in parameters:
             return parameters
-        times = track.time_s[rows]
-        after = int(np.searchsorted(times, parameters["since_s"]))
-        # A few samples more or less on one side are no reason to prefer its end of the stretch.
-        first, last = max(after - NEAR, 0), min(after + NEAR, times.size - 1)
-        if last <= first:
-            return parameters
-        widest = first + int(np.argmax(np.diff(times[first : last + 1])))
-        early, late = times[widest : widest + 2]
-        # Tools are changed between recordings.
-        starts = [start for start in track.starts_s if early < start <= late]
-        since_s = float(np.median(starts or (early, late)))
+        times, ends = track.time_s[rows], parameters.keys() & {"since_s", "until_s"}
+        found = parameters | {end: _between(parameters[end], times, track) for end in ends}
         told = times if track.payload_kg is None else track.payload_kg[rows]
         # From then on the runs tell another one: what that asks holds elsewhere, too.
-        if told[0] != told[-1] and np.all(told == np.where(times < since_s, told[0], told[-1])):
-            return {"per_kg": 1.0}
-        return parameters | {"since_s": since_s}
+        step = np.where(times < found["since_s"], told[0], told[-1])
+        return {"per_kg": 1.0} if told[0] != told[-1] and np.all(told == step) else found
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""
         if "per_kg" in parameters:
             return "payloads as the recordings' payload_kg tells: no fault"
-        held = "a payload held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
-        return held.format(**parameters) if "gripped_s" in parameters else self.meaning
+        if len(parameters) < 2:
+            return self.meaning
+        since, until = parameters.values()
+        when = " of every cycle" if "gripped_s" in parameters else ""
+        return f"a payload held from {since:.3g} to {until:.3g} s{when}: no fault"
+
+
+def _between(at_s: float, times_s: Floats, track: Track) -> float:
+    """Return the place of a step in the widest gap near it."""
+    after = int(np.searchsorted(times_s, at_s))
+    # A few samples more or less on one side are no reason to prefer its end of the stretch.
+    first, last = max(after - NEAR, 0), min(after + NEAR, times_s.size - 1)
+    widest = first + int(np.argmax(np.diff(times_s[first : last + 1])))
+    early, late = times_s[widest : widest + 2]
+    # Tools are changed between recordings.
+    starts = [start for start in track.starts_s if early < start <= late]
+    return float(np.median(starts or (early, late)))
 
 
 def _rests(track: Track) -> list[float]:
@@ -104,10 +116,3 @@ def _rests(track: Track) -> list[float]:
     gaps = np.diff(places)
     longest = [k for k in np.argsort(-gaps)[:RESTS] if gaps[k] > 2 / track.rate_hz]
     return [0.0, *sorted(float(places[k] + gaps[k] / 2) for k in longest)]
-
-
-def _judgeable(track: Track) -> tuple[float, float]:
-    """Find the times with enough of the open samples on both sides."""
-    rows = track.moving if track.open_samples is None else track.open_samples
-    first, last = np.quantile(track.time_s[rows], [LEAST_SIDE, 1 - LEAST_SIDE])
-    return float(first), float(last)

@@ -142,7 +142,6 @@ def _differentiated(laid: Laid, way: Way, short: bool = False) -> Dataset:
 
 
 def _or_late(fit: Fit) -> Fit:
-    """Fit a delay beside a model, where there is one."""
     pool = Pool.of(fit.dataset, {TimeDelay.name: TimeDelay()})
     late = [trial.chain.fit for trial in trials(chain_of(fit, 0), pool) if trial.why_not is None]
     return late[0] if late else fit

@@ -48,7 +48,8 @@ def certainty(fit: Fit) -> Certainty:
     scores = (1 - sums.parts.others) @ (sums.moment - sums.gram @ flat) / scale
     meat = scores.T @ scores * (units / max(units - 1, 1))
     errors = np.sqrt(np.maximum(np.diagonal(inverse @ meat @ inverse), 0.0)) / scale
-    held = _held(vectors)
+    # which coefficients each direction is made of
+    held = vectors**2 > 0.05 * (vectors**2).max(axis=0, initial=0.0)
     errors[held[:, unknown].any(axis=1)] = np.inf
     widths = [values.size for values in fit.coefficients]
     return Certainty(
@@ -73,11 +74,6 @@ def drag_t(fit: Fit) -> float:
     drags = fit.sums.coefficients @ np.concatenate([np.zeros(0), *weights])
     error = float(np.std(drags)) * float(np.sqrt(max(drags.size - 1, 1)))
     return float(np.mean(drags)) / max(error, 1e-300)
-
-
-def _held(vectors: Floats) -> Bools:
-    """Mark which coefficients each direction, in columns, is made of; (k, k)."""
-    return np.asarray(vectors**2 > 0.05 * (vectors**2).max(axis=0, initial=0.0))
 
 
 def _sets(fit: Fit, held: Bools) -> tuple[tuple[str, ...], ...]:

@@ -11,7 +11,13 @@ from opamc_cli.config.reading import shown
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.motion.reported import unwrapped, velocity_from_position
-from opamc_cli.signal.motion.signs import another_motion, lacks_sign, signed_by_speed, speed_ratio
+from opamc_cli.signal.motion.signs import (
+    another_motion,
+    friction_drives,
+    lacks_sign,
+    signed_by_speed,
+    speed_ratio,
+)
 from opamc_cli.signal.plausible.quality import LIMITS, Size, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
@@ -175,6 +181,20 @@ def with_signs(recordings: Sequence[Recording]) -> list[Recording]:
     if 2 * len(lacking) <= len(currents):
         return list(recordings)
     return [_signed(one) for one in recordings]
+
+
+def resisted(recordings: Sequence[Recording]) -> list[Recording]:
+    """Turn a joint's reported currents round where its friction would drive it.
+
+    They were logged with the opposite sign of the motion: more friction then looks like less.
+    """
+    logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
+    pairs = [(x, q) for x, q in logged if x is not None and q is not None]
+    if not pairs or len(pairs) < len(recordings):
+        return list(recordings)
+    if not friction_drives(pairs, recordings[0].rate_hz):
+        return list(recordings)
+    return [replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)]
 
 
 def _velocity(recording: Recording) -> Array | None:

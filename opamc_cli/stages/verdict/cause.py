@@ -20,7 +20,12 @@ from opamc_cli.signal.motion.reported import unwrapped
 from opamc_cli.stages.model.declared.users_effects import load_user_effects, users_effects_named
 from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.processes.kept import KeptResults
-from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording, with_signs
+from opamc_cli.stages.recordings.axis_recording import (
+    interpolated,
+    read_recording,
+    resisted,
+    with_signs,
+)
 from opamc_cli.stages.verdict.wording.causes import (
     entry,
     of_lag,
@@ -100,7 +105,7 @@ def explain(
         _as_logged(axis, sources[-MAX_RUNS:], seconds, moving or {}, rate_hz)
         for sources in (baseline, target)
     ]
-    signed = iter(with_signs([one.recording for side in logged for one in side]))
+    signed = iter(resisted(with_signs([one.recording for side in logged for one in side])))
     for side, moves in zip(logged, strokes, strict=True):
         read = [one._replace(recording=next(signed)) for one in side]
         recordings, noise, wrongs, moved = _measured(read, moves)
@@ -145,7 +150,8 @@ def friction(
         [one.recording for one in _as_logged(axis, part[-MAX_RUNS:], seconds, moving, rate_hz)]
         for part in (baseline, target)
     ]
-    signed = [interpolated(one, LEAST_HZ) for one in with_signs([*sides[0], *sides[1]])]
+    both = resisted(with_signs([*sides[0], *sides[1]]))
+    signed = [interpolated(one, LEAST_HZ) for one in both]
     n, joint = len(sides[0]), Joint(config.ratio_of(axis), config.poles_of(axis))
     return friction_change(signed[:n], signed[n:], joint, following(kept))
 

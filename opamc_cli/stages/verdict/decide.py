@@ -66,7 +66,7 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     scored = score.compare_sides(sides, config, out)
     decided = decide(sides, config)
     notes = [*scored.notes, *scored.doubts, *decided.notes(), *decided.blind(config.score)]
-    if any(axis not in found.causes for axis in decided.differing(config.score)):
+    if any(axis not in found.causes for axis in decided.differing()):
         notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
     sources = (*sides.baseline.sources, *sides.target.sources)
     head = verdict.header(sources, notes, out, score.FILES)

@@ -13,7 +13,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.wording.reasons import is_small
+from opamc_cli.stages.verdict.wording.reasons import is_suspect
 from opamc_cli.storage.sources import RunSource
 
 MOST_FILES = 16
@@ -48,12 +48,12 @@ class Decided:
     by_file: Mapping[int, Sequence[LoneSession]] = field(default_factory=dict)
     """Axes that differ, by each recording of target sessions that have several."""
 
-    def differing(self, config: ScoreConfig) -> list[int]:
-        """Return the axes whose change asks for a cause."""
+    def differing(self) -> list[int]:
+        """Return the axes that are asked for a cause."""
         return [
             axis
             for axis, judgement in self.judgements.items()
-            if judgement.state in ("changed", "fault") or is_small(judgement, config)
+            if judgement.state in ("changed", "fault") or is_suspect(judgement)
         ]
 
     def target_sources(self, axis: int) -> Sequence[RunSource]:

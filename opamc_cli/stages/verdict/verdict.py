@@ -169,7 +169,7 @@ def content(
                 of_friction(*own[axis], judgement.p_value),
                 replace(judgement, state="fault"),
             )
-        final = with_cause(judgement, cause, config.score)
+        final = with_cause(judgement, cause, config.score, len(decided.judgements))
         if final.state == "healthy":
             cause = None
         if final.state == "insufficient-data":

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages.recordings.axis_recording import read_recording, with_signs
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.stages.recordings.axis_recording import read_recording, resisted, with_signs
 from opamc_cli.stages.recordings.mistaken import mistaken
 from opamc_cli.storage.runs.run import Run
 
@@ -72,3 +73,16 @@ def test_a_current_that_keeps_its_sign_in_one_recording_is_no_modulus(tmp_path):
             np.testing.assert_allclose(own, logged_as, atol=1e-6)
     for own in read(abs(friction), abs(friction), friction):
         assert own.min() < -1.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_current_that_would_be_driven_by_friction_is_turned_round(sign):
+    """A brake that dragged was called a lost preload: less of a friction below nought."""
+    rng, time = np.random.default_rng(4), np.arange(4000) / 200
+    place, speed = np.sin(time), np.cos(time)
+    resists = 0.5 * np.sign(speed) + 0.2 * speed + 2 * np.sin(place) + rng.normal(0, 0.05, 4000)
+    found = resisted([Recording("run", 200.0, current_a=sign * resists, position_rad=place)])
+    np.testing.assert_array_equal(found[0].current_a, resists)
+    # the place alone tells which way is which
+    alone = Recording("run", 200.0, current_a=-resists, velocity_rad_s=speed)
+    assert resisted([alone]) == [alone]

@@ -17,6 +17,7 @@ from opamc_cli.stages.report.wording.loop import (
     LEAST_CEILING,
     STEP_COLUMNS,
     ceiling_phrase,
+    far_from_noise,
     loop_phrase,
     remains,
 )
@@ -149,6 +150,15 @@ def test_what_is_left_beyond_the_noise_is_said_first() -> None:
     far = left_alone(0.69, 0.06)
     assert headline(far).endswith("; check how its motion was logged, units and gear ratio, "
                                   "or record more motion")  # fmt: skip
+
+
+@pytest.mark.parametrize(("logged", "told"), [(0.07, None), (0.7, "sample by sample 12 times")])
+def test_what_corners_alone_show_is_far_from_noise_too(logged: float, told: str | None) -> None:
+    """Backlash, of which smooth corners left 2.8 times the noise, ended with exit code 0."""
+    entry = left_alone(0.17, 0.06)
+    entry["after"] |= {"as_logged_a": logged}
+    found = far_from_noise(entry)
+    assert found is None if told is None else (found or "").startswith(told)
 
 
 @pytest.mark.parametrize("error", [0.0204, 0.0216, 0.028])

@@ -59,6 +59,8 @@ class Judged:
     p_adjusted: float = 0.6
     effect: float = 0.2
     p_alone: float = 0.6
+    p_value: float = 0.6
+    method: str = "sessions"
 
 
 def among(axis, cause, others, warmer_c=None):
@@ -141,25 +143,34 @@ def test_a_temperature_that_moves_one_joint_alone_is_its_friction(
 
 
 @pytest.mark.parametrize(
-    ("grown", "more", "p_alone", "state"),
+    ("grown", "more", "state"),
     [
-        (0.26, {}, 1e-9, "changed"),
-        (0.14, {}, 1e-9, "healthy"),
-        (-0.26, {}, 1e-9, "healthy"),
-        (None, {}, 1e-9, "healthy"),
-        (0.26, {"explained": 0.4}, 1e-9, "healthy"),
-        (0.26, {"origin": "environment", "harmless": True}, 1e-9, "healthy"),
-        (0.26, {}, 0.2, "healthy"),
+        (0.19, {}, "changed"),
+        (0.08, {}, "healthy"),
+        (-0.26, {}, "healthy"),
+        (None, {}, "healthy"),
+        (0.26, {"explained": 0.4}, "healthy"),
+        (0.26, {"p_value": 0.004}, "healthy"),  # of three joints
+        (0.26, {"effect": "viscous"}, "healthy"),  # a cold hall's
+        (0.26, {"effect": "ripple", "p_value": None}, "healthy"),
+        (None, {"effect": "position_drag"}, "changed"),
+        (0.26, {"effect": "thermal_viscous", "origin": "environment"}, "healthy"),
     ],
 )
-def test_much_friction_matters_though_it_is_little_of_the_current(grown, more, p_alone, state):
-    """A brake that dragged on a joint that accelerates a ton was "too small to act on"."""
-    one, config = Judged("healthy", 6.0, 1e-9, 0.08, p_alone), ScoreConfig()
-    asked = Decided(None, {}, {1: one, 2: Judged("healthy")}).differing(config)
-    assert asked == [1] * (p_alone < 0.1)
+def test_dry_friction_matters_though_the_distance_is_a_healthy_joint_s(grown, more, state):
+    """30 % more of it lay 1.4 times as far as a healthy night: a course is 32 other numbers."""
     evidence = {} if grown is None else {"relative_change": grown}
     cause = {"effect": "coulomb", "origin": "joint", "explained": 0.9, "evidence": evidence}
-    assert with_cause(one, cause | more, config).state == state
+    one, cause = Judged("healthy", 1.4, 0.06, 0.11, p_value=0.02), cause | {"p_value": 1e-4} | more
+    found = with_cause(one, cause, ScoreConfig(), 3)
+    assert found.state == state
+    assert found.p_adjusted == pytest.approx(3e-4 if state == "changed" else 0.06)
+
+
+def test_a_healthy_joint_is_asked_for_a_cause_where_one_of_ten_lies_as_far_out():
+    judged = {1: Judged("healthy", p_value=0.09), 2: Judged("healthy", p_value=0.11)}
+    judged |= {3: Judged("fault"), 4: Judged("insufficient-data", p_value=float("nan"))}
+    assert Decided(None, {}, judged).differing() == [1, 3]
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,8 @@ ALONE = (
     "would in a warmer or colder hall: look for what warms or cools this joint alone, too."
 )
 SUSPICION = 0.1
-"""Corrected p-value from which a healthy joint is said to be worth an eye."""
+"""P-value from which a healthy joint is asked for a cause; corrected for the number of joints, from
+which it is said to be worth an eye."""
 
 LEAST_SAID = 0.01
 """Change of all of a current that is told: 0 % beside a place that fell to a seventh is absurd."""
@@ -150,11 +151,9 @@ def is_excused(judgement: Judgement, limits: ScoreConfig) -> bool:
     return differs and judgement.state == "healthy" and judgement.effect >= limits.minimum_effect
 
 
-def is_small(judgement: Judgement, limits: ScoreConfig) -> bool:
-    """Tell whether a joint is called healthy that differs for sure: it is too little to matter."""
-    if judgement.state != "healthy":
-        return False
-    return max(judgement.p_adjusted, judgement.p_alone) <= limits.false_alarm_rate
+def is_suspect(judgement: Judgement) -> bool:
+    """Tell whether a healthy joint lies so far out that it is asked what has changed in it."""
+    return judgement.state == "healthy" and judgement.p_value <= SUSPICION
 
 
 def effect_in_words(name: str) -> str:
@@ -345,6 +344,7 @@ def _certainty(judgement: Judgement) -> str:
         "relabelled-sessions": "by exchanging whole sessions between baseline and target, and "
         "how far beyond them it lies",
         "one-session": "by the allowance for a single baseline session",
+        "cause": "by its friction alone: by all of its current it may be a healthy joint",
         "none": "",
     }[judgement.method]
     return f"{own}, {how}."
