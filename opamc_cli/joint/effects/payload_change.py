@@ -59,8 +59,8 @@ class PayloadChange(Effect):
         return dict.fromkeys(("since_s", "until_s"), (float(first), float(last)))
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
-        """Of both ends half of the way between two times that are tried, and a little more."""
-        both = {end: 0.6 * (b - a) / EDGES for end, (a, b) in self.limits(track).items()}
+        """Of both ends more than a sealed block, one of twelve: within it nothing tells."""
+        both = {end: 1.2 * (b - a) / EDGES for end, (a, b) in self.limits(track).items()}
         return both if "until_s" in parameters else super().first_steps(track, parameters)
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
