@@ -42,7 +42,7 @@ class PayloadChange(Effect):
             tried = np.linspace(first, last, GUESSES)
         times = [float(time) for time in tried if first <= time <= last]
         steps = [{"since_s": time} for time in times]
-        edges = combinations(times[:: len(times) // EDGES + 1], 2)
+        edges = combinations(times[len(times) // EDGES :: len(times) // EDGES + 1], 2)
         steps += [{"since_s": one, "until_s": other} for one, other in edges]
         # Where phases follow the joint, half turns that are lost from rest to rest look the same.
         held = "logged" in track.channels and np.isfinite(track.period_s)
@@ -59,8 +59,9 @@ class PayloadChange(Effect):
         return dict.fromkeys(("since_s", "until_s"), (float(first), float(last)))
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
-        """Half of the way between two of the times for once in all, and a little more."""
-        return {end: 0.6 * (b - a) / EDGES for end, (a, b) in self.limits(track).items()}
+        """Of both ends more than a sealed block, one of twelve: within it nothing tells."""
+        both = {end: 1.2 * (b - a) / EDGES for end, (a, b) in self.limits(track).items()}
+        return both if "until_s" in parameters else super().first_steps(track, parameters)
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Gravity's and inertia's regressors after the step."""
@@ -99,13 +100,12 @@ class PayloadChange(Effect):
 
 
 def _between(at_s: float, times_s: Floats, track: Track) -> float:
-    """Return the place of a step in the widest gap near it."""
+    """Return the widest gap near a step: where a recording starts in it, else its middle."""
     after = int(np.searchsorted(times_s, at_s))
     # A few samples more or less on one side are no reason to prefer its end of the stretch.
     first, last = max(after - NEAR, 0), min(after + NEAR, times_s.size - 1)
     widest = first + int(np.argmax(np.diff(times_s[first : last + 1])))
     early, late = times_s[widest : widest + 2]
-    # Tools are changed between recordings.
     starts = [start for start in track.starts_s if early < start <= late]
     return float(np.median(starts or (early, late)))
 

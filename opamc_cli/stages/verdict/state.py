@@ -209,11 +209,12 @@ def with_cause(
     if is_suspect(judgement):
         if cause["effect"] not in DRY:
             return judgement
-        amount = cause["evidence"].get("relative_change") or 0.0
-        much = cause["effect"] == "position_drag" or amount >= config.minimum_effect
+        # of friction at one place no amount is known
+        everywhere = cause["evidence"].get("relative_change") or 0.0
+        amount = everywhere if cause["effect"] == "coulomb" else judgement.effect
         p_value = float(cause["p_value"])
         p_adjusted = min(joints * p_value, 1.0)
-        if not much or p_adjusted > config.false_alarm_rate:
+        if not amount >= config.minimum_effect or p_adjusted > config.false_alarm_rate:
             return judgement
         return replace(
             judgement, state="changed", method="cause",

@@ -154,6 +154,7 @@ def test_a_temperature_that_moves_one_joint_alone_is_its_friction(
         (0.26, {"effect": "viscous"}, "healthy"),  # a cold hall's
         (0.26, {"effect": "ripple", "p_value": None}, "healthy"),
         (None, {"effect": "position_drag"}, "changed"),
+        (None, {"effect": "position_drag", "of_all": 0.02}, "healthy"),  # of phases, which guess
         (0.26, {"effect": "thermal_viscous", "origin": "environment"}, "healthy"),
     ],
 )
@@ -161,7 +162,8 @@ def test_dry_friction_matters_though_the_distance_is_a_healthy_joint_s(grown, mo
     """30 % more of it lay 1.4 times as far as a healthy night: a course is 32 other numbers."""
     evidence = {} if grown is None else {"relative_change": grown}
     cause = {"effect": "coulomb", "origin": "joint", "explained": 0.9, "evidence": evidence}
-    one, cause = Judged("healthy", 1.4, 0.06, 0.11, p_value=0.02), cause | {"p_value": 1e-4} | more
+    cause = cause | {"p_value": 1e-4} | more
+    one = Judged("healthy", 1.4, 0.06, more.get("of_all", 0.11), p_value=0.02)
     found = with_cause(one, cause, ScoreConfig(), 3)
     assert found.state == state
     assert found.p_adjusted == pytest.approx(3e-4 if state == "changed" else 0.06)

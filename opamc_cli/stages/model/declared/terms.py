@@ -55,8 +55,8 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
     otherwise = {*given} & {*effect.searches} - {*searched}
     if otherwise:
         searched, defaults = {}, dict.fromkeys(effect.forms, 0.0)
-    for name in searched:
-        if name not in given:
+    for name in searched:  # a payload that is never put down is a guess without its end
+        if name not in given and all(name in guess for guess in guesses):
             msg = (
                 f"Effect {effect.name!r} in the model is declared without {name!r}; give it too, "
                 "or leave out all its parameters to have them found"
