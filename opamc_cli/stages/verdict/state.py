@@ -19,8 +19,8 @@ MAIN_SHARE = 0.5
 
 DRY = ("coulomb", "position_drag")
 """Friction that makes a joint `changed` though its distance leaves it healthy; a cold hall moves
-what grows with the speed. Of 140 joints of healthy robots, 14 degrees off at most, none has such a
-cause to a level of 1 % for all joints of a robot, four have other friction (docs/decision.md)."""
+what grows with the speed. Of 232 joints of healthy robots, 14 degrees off at most, none has such a
+cause to a level of 1 % for all joints of a robot, seven have other friction (docs/decision.md)."""
 
 AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
