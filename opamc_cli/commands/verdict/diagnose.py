@@ -9,6 +9,9 @@ from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import ExitCode
 
+IN_PART = "in part: what was not used, or not compared, is said on standard error"
+"""Said below a verdict that may read as if it were of all that was recorded."""
+
 
 def diagnose(
     baseline: Annotated[
@@ -72,6 +75,7 @@ def diagnose(
             "report": str(outcome.report_path),
         },
         *([verdict_table(outcome.verdict)] if verbose else verdict_lines(outcome.verdict)),
+        *([IN_PART] if outcome.errors else []),
         f"report: {outcome.report_path}",
         urgent=outcome.exit_code is not ExitCode.DONE or bool(doubtful(outcome.verdict)),
     )
