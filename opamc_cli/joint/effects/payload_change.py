@@ -94,7 +94,7 @@ class PayloadChange(Effect):
             return "payloads as the recordings' payload_kg tells: no fault"
         if len(parameters) < 2:
             return self.meaning
-        since, until = parameters.values()
+        since, until = sorted(parameters.values())
         when = " of every cycle" if "gripped_s" in parameters else ""
         return f"a payload held from {since:.3g} to {until:.3g} s{when}: no fault"
 
