@@ -92,3 +92,25 @@ def test_a_payload_that_is_held_in_every_cycle_is_declared_by_its_rests():
     term = declared_term(built_in_library()["payload_change"], declared, track)
     assert term is not None
     assert term.parameters == held
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"gripped_s": 3.0}, "declared without 'released_s'; give it too"),
+        ({"released_s": 3.0}, "declared without 'gripped_s'"),
+        ({"until_s": 3.0}, "declared without 'since_s'"),
+        ({"since_s": 20.0, "until_s": 5.0}, "has until_s 5; it has to be above since_s, 20"),
+        (
+            {"gripped_s": 2.0, "released_s": 2.0},
+            "has released_s 2; it has to be above gripped_s",
+        ),
+    ],
+)
+def test_a_payload_with_one_end_too_few_or_that_ends_before_it_begins_is_refused(given, why):
+    """One ended as a bug, two were fitted to nothing without a word."""
+    path = np.cumsum(np.sin(np.arange(2000) / 100)) / 100
+    track = build_track([Recording("r", 250.0, current_a=path, position_rad=path)], Joint())
+    declared = DeclaredEffect(effect="payload_change", parameters=given)
+    with pytest.raises(ConfigError, match=why):
+        declared_term(built_in_library()["payload_change"], declared, track)

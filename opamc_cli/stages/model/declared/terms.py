@@ -1,6 +1,7 @@
 """Effects as a user declares them in model.yaml, made ready for the fit."""
 
 import difflib
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Track
+
+SPANS = (("since_s", "until_s"), ("gripped_s", "released_s"))
+"""When a payload is taken and put down: once, or in every cycle; the first one need never end."""
 
 
 def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Term | None:
@@ -19,8 +23,8 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
     Raises
     ------
     ConfigError
-        If a parameter is unknown, an exponent is not above 0, or a parameter that the data would
-        decide is missing beside others.
+        If a parameter is unknown, an exponent is not above 0, a payload is put down before it was
+        taken, or a parameter that the data would decide is missing beside others.
     """
     given = declared.parameters
     form = effect.form_of(given)
@@ -51,6 +55,7 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
             "above 0"
         )
         raise ConfigError(msg)
+    _check_spans(effect, given)
     # What is placed by other parameters, as a payload by the rests of a cycle, needs none of these.
     otherwise = {*given} & {*effect.searches} - {*searched}
     if otherwise:
@@ -63,3 +68,18 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
             )
             raise ConfigError(msg)
     return Term(effect, {**defaults, **given}, declared.columns)
+
+
+def _check_spans(effect: Effect, given: Mapping[str, float]) -> None:
+    """Refuse a payload without one of its ends, or that is put down before it was taken."""
+    for first, last in SPANS:
+        lacking = [name for name in (first, last) if name not in given]
+        if len(lacking) == 1 and lacking != ["until_s"]:
+            msg = f"Effect {effect.name!r} in the model is declared without {lacking[0]!r}"
+            raise ConfigError(f"{msg}; give it too")
+        if not lacking and given[last] <= given[first]:
+            msg = (
+                f"Effect {effect.name!r} in the model has {last} {given[last]:g}; it has to be "
+                f"above {first}, {given[first]:g}"
+            )
+            raise ConfigError(msg)
