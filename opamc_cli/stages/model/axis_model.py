@@ -26,6 +26,8 @@ from opamc_cli.stages.recordings.axis_recording import (
     gaps,
     positions_beside,
     read_recording,
+    reported,
+    turned_round,
     with_signs,
 )
 from opamc_cli.stages.recordings.mistaken import mistaken
@@ -267,21 +269,17 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     recordings, commanded = _without_commands(runs, axis, recordings)
     doubts += commanded
     notes = [*in_part, *doubts]
-    logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
-    pairs = [(x, q) for x, q in logged if x is not None and q is not None]
-    signed = len(pairs) == len(recordings)
+    pairs = reported(recordings)
     # Of a heavy joint of an arm it may be anything until the others' torques are known: one of
     # positive friction (by 44 errors) drove by 14 in another program.
-    if opposite is None and signed and not moving_beside(recordings):
+    if opposite is None and pairs and not moving_beside(recordings):
         opposite = friction_drives(pairs, rate_hz)
         notes += [OPPOSITE.format(axis)] if opposite else []
-    if signed and opposite:
-        recordings = [
-            replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)
-        ]
+    if pairs and opposite:
+        recordings = turned_round(recordings)
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    signs = signed and bool(opposite)
+    signs = bool(pairs and opposite)
     return AxisRecordings(recordings, units.pop(), signs, notes, doubts, in_part)
 
 

@@ -183,18 +183,27 @@ def with_signs(recordings: Sequence[Recording]) -> list[Recording]:
     return [_signed(one) for one in recordings]
 
 
+def reported(recordings: Sequence[Recording]) -> list[tuple[Array, Array]]:
+    """Return each recording's reported current and position; none where one lacks either."""
+    logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
+    pairs = [(x, q) for x, q in logged if x is not None and q is not None]
+    return pairs if len(pairs) == len(recordings) else []
+
+
+def turned_round(recordings: Sequence[Recording]) -> list[Recording]:
+    """Take reported currents with the opposite sign."""
+    currents = (x for x, _ in reported(recordings))
+    return [replace(one, current_a=-x) for one, x in zip(recordings, currents, strict=True)]
+
+
 def resisted(recordings: Sequence[Recording]) -> list[Recording]:
     """Turn a joint's reported currents round where its friction would drive it.
 
     They were logged with the opposite sign of the motion: more friction then looks like less.
     """
-    logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
-    pairs = [(x, q) for x, q in logged if x is not None and q is not None]
-    if not pairs or len(pairs) < len(recordings):
-        return list(recordings)
-    if not friction_drives(pairs, recordings[0].rate_hz):
-        return list(recordings)
-    return [replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)]
+    pairs = reported(recordings)
+    opposite = bool(pairs) and friction_drives(pairs, recordings[0].rate_hz)
+    return turned_round(recordings) if opposite else list(recordings)
 
 
 def _velocity(recording: Recording) -> Array | None:

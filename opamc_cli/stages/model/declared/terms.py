@@ -75,8 +75,8 @@ def _check_spans(effect: Effect, given: Mapping[str, float]) -> None:
     for first, last in SPANS:
         lacking = [name for name in (first, last) if name not in given]
         if len(lacking) == 1 and lacking != ["until_s"]:
-            msg = f"Effect {effect.name!r} in the model is declared without {lacking[0]!r}"
-            raise ConfigError(f"{msg}; give it too")
+            msg = f"Effect {effect.name!r} in the model is declared without {lacking[0]!r}; "
+            raise ConfigError(msg + "give it too")
         if not lacking and given[last] <= given[first]:
             msg = (
                 f"Effect {effect.name!r} in the model has {last} {given[last]:g}; it has to be "
