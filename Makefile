@@ -25,7 +25,7 @@ demo: $(STAMP)  ## Diagnose data/samples; the report's path is printed
 	@echo "open $(CURDIR)/opamc-out/report.html"
 
 demo-nightly: $(STAMP)  ## Three virtual robots, ten nights, one joint that wears: page and alarm
-	@$(BIN)/python benchmarks/cell_logs.py opamc-cell
+	@$(BIN)/python benchmarks/nightly/cell_logs.py opamc-cell
 	@$(BIN)/opamc nightly opamc-cell/cell.yaml --since 2026-03-01 --jobs 0 || test $$? -eq 1
 	@echo "open $(CURDIR)/opamc-cell/nightly/index.html"
 
@@ -58,9 +58,9 @@ samples: $(STAMP)  ## Record data/samples anew with the virtual testbed
 
 bench: $(STAMP)  ## Speed, short form: kernels, commands, an hour from segment to score
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
-	$(BIN)/python benchmarks/kernels.py --quick
+	$(BIN)/python benchmarks/chain/kernels.py --quick
 	$(BIN)/python benchmarks/commands.py --times 3 --minutes 2
-	$(BIN)/python benchmarks/pipeline.py --hours 0.25 0.5 1
+	$(BIN)/python benchmarks/chain/pipeline.py --hours 0.25 0.5 1
 
 fuzz: $(STAMP)  ## 5000 wrong inputs, ten minutes: each a sentence and the right code
 	$(BIN)/python tests/reliability/fuzz.py --count 5000 --minutes 10
@@ -69,19 +69,19 @@ kill: $(STAMP)  ## 500 kills and interruptions of all commands: whole results, n
 	$(BIN)/python tests/reliability/kills.py --count 500
 
 walk: $(STAMP)  ## 40 random walks over what may befall a cell: `opamc nightly` silent nowhere
-	$(BIN)/python benchmarks/nightly_walk.py 9000 40
+	$(BIN)/python benchmarks/nightly/nightly_walk.py 9000 40
 
 faults: $(STAMP)  ## Every system call on a command's output failing once (needs a C compiler)
 	$(BIN)/python tests/reliability/faults.py --every 1
 
 studies: $(STAMP)  ## The studies behind the documentation's figures; takes hours
-	$(BIN)/python benchmarks/itsc.py
-	$(BIN)/python benchmarks/thesis_cases.py --write
-	$(BIN)/python benchmarks/boundaries.py --write
-	$(BIN)/python benchmarks/decision.py
-	$(BIN)/python benchmarks/closed_loop.py
-	$(BIN)/python benchmarks/rounds.py --anywhere
-	$(BIN)/python benchmarks/departures.py
+	$(BIN)/python benchmarks/chain/itsc.py
+	$(BIN)/python benchmarks/chain/thesis_cases.py --write
+	$(BIN)/python benchmarks/chain/boundaries.py --write
+	$(BIN)/python benchmarks/decision/decision.py
+	$(BIN)/python benchmarks/decision/closed_loop.py
+	$(BIN)/python benchmarks/decision/rounds.py --anywhere
+	$(BIN)/python benchmarks/decision/departures.py
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/panel.py
 	$(BIN)/python benchmarks/cause.py --seeds 30 --write

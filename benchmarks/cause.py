@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from change_pairs import JOINT_CHANGES, ROBOT_CHANGES, Pair, joint_pair, robot_pair
-from plain_cause import Plain, plain_cause
+from cause.change_pairs import JOINT_CHANGES, ROBOT_CHANGES, Pair, joint_pair, robot_pair
+from cause.plain_cause import Plain, plain_cause
 
 from opamc_cli.joint.change.explain import FAULT_SHARE, Change, explain_change
 

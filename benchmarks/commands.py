@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from pipeline import OPAMC, ROOT, Measured, measure
+from chain.pipeline import OPAMC, ROOT, Measured, measure
 
 SAMPLE = ROOT / "data" / "samples" / "normal" / "session-000.parquet"
 

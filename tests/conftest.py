@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 # set before numpy is loaded, for the processes that tests start as well
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # studies and tests share made-up recordings and plain rivals
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "benchmarks" / "sources")]
+sys.path[:0] = [str(ROOT / "benchmarks" / room) for room in (".", "sources", "nightly")]
 
 from opamc_cli.__main__ import main  # noqa: E402
 

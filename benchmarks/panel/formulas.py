@@ -1,4 +1,4 @@
-"""Joints whose current is a formula: of the tests, and of benchmarks/algebraic_joint.py."""
+"""Joints whose current is a formula: of the tests, and of benchmarks/sources/algebraic_joint.py."""
 
 import sys
 from collections.abc import Iterator
@@ -97,7 +97,7 @@ def algebraic_cases(seed: int, wanted: Wanted) -> Iterator[Case]:
 
 
 def algebraic(hidden: str, size: float, motion: str, number: int) -> list[Logged]:
-    """Record one joint of benchmarks/algebraic_joint.py."""
+    """Record one joint of benchmarks/sources/algebraic_joint.py."""
     made = algebraic_joint.record(motion, hidden or None, size, number)
     warm = np.asarray(made.temperature_c, float) if hidden == "thermal_viscous" else None
     rate_hz = made.joint.path.rate_hz

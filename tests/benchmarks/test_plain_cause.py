@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from change_pairs import joint_pair
-from plain_cause import Plain, plain_cause
+from cause.change_pairs import joint_pair
+from cause.plain_cause import Plain, plain_cause
 
 
 @pytest.mark.parametrize(

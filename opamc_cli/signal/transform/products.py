@@ -9,7 +9,7 @@ Ints = NDArray[np.int64]
 
 NARROW = 16
 """Signals up to which loops are faster than BLAS, whose call costs more than a thousand products:
-one by one by ten, 70 by eight by a quarter, 70 by 70 not at all (`benchmarks/kernels.py`)."""
+one by one by ten, 70 by eight by a quarter, 70 by 70 not at all (`benchmarks/chain/kernels.py`)."""
 
 
 def products_over(ranges: Ints, left: Floats, right: Floats) -> Floats:

@@ -47,7 +47,7 @@ def write_run(path: Path, info: RunInfo, schema: pa.Schema) -> Iterator[pq.Parqu
             schema.with_metadata(metadata),
             # What an A/D converter delivers has few distinct values: a dictionary of them makes
             # the file a quarter smaller and decodes twice as fast as zstd over split bytes
-            # (benchmarks/encoding.py); other floats fall back to plain pages by themselves.
+            # (benchmarks/chain/encoding.py); other floats fall back to plain pages by themselves.
             use_dictionary=True,
             compression="lz4",
             write_page_checksum=True,

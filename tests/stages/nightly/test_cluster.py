@@ -40,7 +40,7 @@ def nightly(cell: Path, scheduler: str | None) -> stage.CellOutcome:
 
 @pytest.mark.long
 def test_a_cluster_with_a_killed_worker_ends_with_the_same_bytes(cell, cluster):
-    """The bookkeeping, with a stand-in; the true diagnosis in benchmarks/cluster.py."""
+    """The bookkeeping, with a stand-in; the true diagnosis in benchmarks/nightly/cluster.py."""
     with nightly_kills.with_stand_in():
         nightly(cell, None)
         plain = nightly_kills.end_state(cell.parent / "nightly")

@@ -1,4 +1,4 @@
-"""The short form of benchmarks/nightly_kills.py: whatever happens, the end is the same."""
+"""The short form of benchmarks/nightly/nightly_kills.py: whatever happens, the end is the same."""
 
 import random
 import shutil
@@ -11,7 +11,7 @@ import nightly_kills
 import pytest
 
 pytestmark = pytest.mark.long
-BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
+STUDIES = Path(__file__).parents[3] / "benchmarks" / "nightly"
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_starts_at_once(trial):
 def test_full_disks():
     done = subprocess.run(
         [
-            *(sys.executable, BENCHMARKS / "nightly_kills.py"),
+            *(sys.executable, STUDIES / "nightly_kills.py"),
             *("--kills", "0", "--worker-kills", "0", "--robots", "2", "--disk", "150"),
         ],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""The short form of benchmarks/nightly_walk.py: nothing ends or fails without a word."""
+"""The short form of benchmarks/nightly/nightly_walk.py: nothing ends or fails without a word."""
 
 import nightly_walk
 import pytest

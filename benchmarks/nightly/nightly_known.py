@@ -1,6 +1,6 @@
 """What a start costs that finds nothing new: the time and the memory of looking.
 
-python benchmarks/nightly_known.py --robots 50 --nights 106     # 5000 judged nights are known
+python benchmarks/nightly/nightly_known.py --robots 50 --nights 106  # 5000 judged nights are known
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """A Dask cluster beside this machine's processes: the same bytes, one worker killed, at what cost.
 
-python benchmarks/cluster.py              # a stand-in for the diagnosis: the overhead
-python benchmarks/cluster.py --real       # the true diagnosis
+python benchmarks/nightly/cluster.py              # a stand-in for the diagnosis: the overhead
+python benchmarks/nightly/cluster.py --real       # the true diagnosis
 """
 
 import argparse

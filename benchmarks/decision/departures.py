@@ -4,10 +4,11 @@ One joint of `sources/closed_loop_joint.py` a robot, six baseline nights in a ha
 to night that nobody logs, four healthy nights more and one with each fault. A rival's score is a
 ratio of distances, its limit what 1 % of the healthy nights exceed.
 
-    python benchmarks/departures.py --robots 100 --first 9000
+    python benchmarks/decision/departures.py --robots 100 --first 9000
 """
 
 import argparse
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,9 @@ from pathlib import Path
 import numpy as np
 from closed_loop import HALL_K, RATES_HZ
 from numpy.typing import NDArray
-from sources.closed_loop_joint import FAULTS, draw_joint, record
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
+from closed_loop_joint import FAULTS, draw_joint, record
 
 from opamc_cli.config import load_config
 from opamc_cli.decision.judge import Bundle, judge

@@ -6,9 +6,9 @@ some of a state as target, each recording a session of its own. The rivals are g
 decision has to do without: their limit is the 99 % quantile of the score over splits of all
 healthy recordings in the same sizes.
 
-    python benchmarks/actuator.py --quick
-    python benchmarks/actuator.py --draws 40 --seed 1
-    python benchmarks/actuator.py --causes --draws 10 --seed 11
+    python benchmarks/decision/actuator.py --quick
+    python benchmarks/decision/actuator.py --draws 40 --seed 1
+    python benchmarks/decision/actuator.py --causes --draws 10 --seed 11
 """
 
 import argparse
@@ -38,7 +38,7 @@ from opamc_cli.stages.verdict.state import believed, with_cause
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 
-DATA = Path(__file__).parents[2] / "shared" / "data" / "linear_actuator"
+DATA = Path(__file__).parents[3] / "shared" / "data" / "linear_actuator"
 RATE_HZ = 25.0
 SCREW_RAD_PER_MM = 0.02
 """Any constant would do: the stroke of 120 mm as 2.4 rad of a joint."""

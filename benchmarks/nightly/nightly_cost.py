@@ -5,7 +5,7 @@ six baseline nights, which an earlier night has read, and one target night of on
 several robots also what a night costs among others: the start that judges all but the first, less
 the one that judged the first alone, for each robot that it judged more.
 
-    python benchmarks/nightly_cost.py --rounds 3 --robots 6
+    python benchmarks/nightly/nightly_cost.py --rounds 3 --robots 6
 """
 
 import argparse

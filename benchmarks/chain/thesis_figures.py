@@ -1,4 +1,4 @@
-"""Pictures of benchmarks/thesis_cases.py, after the thesis's Figures 5-4 to 5-14."""
+"""Pictures of benchmarks/chain/thesis_cases.py, after the thesis's Figures 5-4 to 5-14."""
 
 from pathlib import Path
 from typing import Any

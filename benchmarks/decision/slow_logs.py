@@ -6,8 +6,8 @@ held against three of the same robot, healthy or with one damaged joint. Two pla
 the same motions: how far the sides' mean courses lie apart, and the logarithms of three sizes (root
 mean square, that of successive differences, mean), over what the baseline's recordings differ by.
 
-    python benchmarks/slow_logs.py --quick
-    python benchmarks/slow_logs.py --seeds 40:52
+    python benchmarks/decision/slow_logs.py --quick
+    python benchmarks/decision/slow_logs.py --seeds 40:52
 """
 
 import argparse
@@ -31,7 +31,7 @@ from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
 from opamc_cli.testbed.robot import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FINE_HZ = 500.0
 RATES_HZ = (25.0, 100.0, 125.0)
 SPEEDS_PERCENT = (5.0, 20.0, 100.0)

@@ -6,8 +6,8 @@ every report and verdict, index.html and metrics.prom; what holds a clock is lef
 have a stand-in in the place of the diagnosis, which takes 20 ms: it is the bookkeeping that is
 tried. `--real` has the true one.
 
-    python benchmarks/nightly_kills.py --kills 270 --worker-kills 30 --disk 10 --starts 50
-    python benchmarks/nightly_kills.py --real --kills 20 --worker-kills 10
+    python benchmarks/nightly/nightly_kills.py --kills 270 --worker-kills 30 --disk 10 --starts 50
+    python benchmarks/nightly/nightly_kills.py --real --kills 20 --worker-kills 10
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Boundaries and cycles that the chain finds, against the testbed's truth.
 
-    python benchmarks/boundaries.py            # 20, 50, 100 %; 0, 1, 2 kg; down to 20 dB
-    python benchmarks/boundaries.py --quick
-    python benchmarks/boundaries.py --write    # and updates docs/validation.md
+    python benchmarks/chain/boundaries.py            # 20, 50, 100 %; 0, 1, 2 kg; down to 20 dB
+    python benchmarks/chain/boundaries.py --quick
+    python benchmarks/chain/boundaries.py --write    # and updates docs/validation.md
 
 Every axis is recorded alone with sensor noise set to a signal-to-noise ratio: power of the phase
 current while the axis moves, over the power of the noise. Seeds begin at 1010: on earlier ones two
@@ -25,7 +25,7 @@ from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.testbed.robot import Recording, simulate
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FIRST_SEED = 1010
 BEGIN, END = "<!-- boundaries: begin -->", "<!-- boundaries: end -->"
 
@@ -124,8 +124,8 @@ def main() -> None:
         before, rest = path.read_text().split(BEGIN)
         note = (
             f"Seeds {arguments.first_seed} to {arguments.first_seed + seeds - 1}, six axes, four "
-            "cycles of four motions each; `python benchmarks/boundaries.py --write` makes this "
-            "section."
+            "cycles of four motions each; `python benchmarks/chain/boundaries.py --write` makes "
+            "this section."
         )
         section = "\n".join([BEGIN, "", note, "", *lines, "", END])
         path.write_text(before + section + rest.split(END)[1])

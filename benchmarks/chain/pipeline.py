@@ -1,6 +1,6 @@
 """How long a shift of one robot takes from segment to score, and how much memory.
 
-    python benchmarks/pipeline.py --hours 1 2 4 8
+    python benchmarks/chain/pipeline.py --hours 1 2 4 8
 
 A run of the testbed (six axes, 18 phase currents, 2048 Hz) is repeated until it has the length
 asked for. Every stage is the public command in a process of its own; beside the whole stands the
@@ -26,7 +26,7 @@ import pyarrow.parquet as pq
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, write_run
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 OUT = ROOT / "benchmarks" / "out" / "pipeline"
 OPAMC = [sys.executable, "-m", "opamc_cli"]
 

@@ -1,6 +1,6 @@
 """Measured phase currents: divergence over the level of an inter-turn short circuit.
 
-    python benchmarks/itsc.py
+    python benchmarks/chain/itsc.py
 
 Takes the public ITSC recordings (three phases of an induction motor, 60 Hz supply, 1000 Hz, 5 s;
 five healthy, five at each of the levels A1..A4 = 10..40 % of phase A's turns) through the real
@@ -23,7 +23,7 @@ from opamc_cli.config import load_config
 from opamc_cli.stages.chain import score
 from opamc_cli.stages.chain.to_patterns import run_chain
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "itsc_phase_current"
 LEVELS = ("A1", "A2", "A3", "A4")
 

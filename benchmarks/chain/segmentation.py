@@ -1,6 +1,6 @@
 """How well motions are found: boundaries, largest frequency, direction, against generated truth.
 
-    python benchmarks/segmentation.py [--seeds N] [--quick]
+    python benchmarks/chain/segmentation.py [--seeds N] [--quick]
 
 Every seed draws a program of six moves (62.8, 157 or 314 Hz, shapes and lengths of the ramps,
 rests of 0.2 to 1.2 s), a joint (holding torque or none, friction, inertia) and a signal-to-noise
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parent / "sources"))
+sys.path.append(str(Path(__file__).parents[1] / "sources"))
 from axis import segments_of
 from carriers import Move, Recording, Torque, record
 

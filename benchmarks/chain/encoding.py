@@ -1,6 +1,6 @@
 """Size and decoding speed of a run's samples under the encodings that Parquet offers.
 
-python benchmarks/encoding.py
+python benchmarks/chain/encoding.py
 
 The reason for the one that `opamc_cli.storage.runs.writing` uses. Times are processor seconds of
 one thread, the best of five.
@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 
-SAMPLE = Path(__file__).parents[1] / "data" / "samples" / "normal" / "session-000.parquet"
+SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "normal" / "session-000.parquet"
 
 ENCODINGS = {
     "dictionary, lz4": {"use_dictionary": True, "compression": "lz4"},

@@ -1,6 +1,6 @@
 """How much faster than real time the testbed is: six axes, 18 phase currents, 2048 Hz.
 
-    python benchmarks/testbed_speed.py [--jobs 2] [--quick]
+    python benchmarks/chain/testbed_speed.py [--jobs 2] [--quick]
 
 Times the simulation alone on one core, and whole `opamc simulate` sessions (with files) on
 `--jobs` worker processes.
@@ -15,7 +15,7 @@ from opamc_cli.config.testbed import load_testbed
 from opamc_cli.stages.recordings import simulate as stage
 from opamc_cli.testbed.robot import simulate
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def main() -> None:

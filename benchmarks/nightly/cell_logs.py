@@ -1,6 +1,6 @@
 """Short recordings of small virtual robots, laid out as a logger would: for trials and the demo.
 
-python benchmarks/cell_logs.py opamc-cell     # three robots, ten nights, one joint that wears
+python benchmarks/nightly/cell_logs.py opamc-cell  # three robots, ten nights, one joint that wears
 """
 
 import argparse
@@ -15,7 +15,7 @@ from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.testbed.robot import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FIRST_NIGHT = date(2026, 3, 1)
 
 

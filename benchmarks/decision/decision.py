@@ -6,8 +6,8 @@ recordings go through the chain's own stages (segment, identify, patterns); ever
 same envelopes of the same motions. With `--segments truth` the motions are cut where the testbed
 knows them to be, so that the decision is measured without the segmentation.
 
-    python benchmarks/decision.py --quick
-    python benchmarks/decision.py --seeds 15000:15040 --jobs 2
+    python benchmarks/decision/decision.py --quick
+    python benchmarks/decision/decision.py --seeds 15000:15040 --jobs 2
 """
 
 import argparse
@@ -51,8 +51,8 @@ from opamc_cli.storage.sources import RunSource, sources_record
 from opamc_cli.storage.tables import read_table, write_table
 from opamc_cli.testbed.robot import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
-CACHE = Path(__file__).resolve().parent / "out" / "decision"
+ROOT = Path(__file__).resolve().parents[2]
+CACHE = Path(__file__).resolve().parents[1] / "out" / "decision"
 
 RECORDED_BY = ("testbed", "signal", "stages/chain", "stages/recordings")
 SEVERITIES = (0.0, 0.1, 0.25, 0.5, 1.0)
@@ -596,7 +596,7 @@ def main() -> None:
         nested = [evaluate(job) for job in jobs]
     results = [row for rows in nested for row in rows]
     settings = f" --segments {options.segments}" + (" --remount" if options.remount else "")
-    command = f"python benchmarks/decision.py --seeds {first}:{stop}{settings}"
+    command = f"python benchmarks/decision/decision.py --seeds {first}:{stop}{settings}"
     text = report(results, command)
     print(text)
     print(f"\n{len(jobs)} fleets in {time.perf_counter() - started:.0f} s")

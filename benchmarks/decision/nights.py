@@ -6,8 +6,8 @@ others with damage, or with more friction. `--by-file` takes each file for a ses
 it must not be. Tables are kept in `benchmarks/out/nights`, so that another decision is tried in
 seconds: remove them when anything before the decision changes.
 
-    python benchmarks/nights.py --quick
-    python benchmarks/nights.py --robots 140 --first 5000
+    python benchmarks/decision/nights.py --quick
+    python benchmarks/decision/nights.py --robots 140 --first 5000
 """
 
 import argparse
@@ -36,8 +36,8 @@ from opamc_cli.storage.sources import RunSource
 from opamc_cli.testbed.parameters import Robot
 from opamc_cli.testbed.robot import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
-CACHE = Path(__file__).resolve().parent / "out" / "nights"
+ROOT = Path(__file__).resolve().parents[2]
+CACHE = Path(__file__).resolve().parents[1] / "out" / "nights"
 RATE_HZ = 250.0
 AXIS = 3
 FILES = (1, 4, 16)

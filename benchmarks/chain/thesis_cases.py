@@ -1,8 +1,8 @@
 """The thesis's two cases on the virtual testbed, through the real chain.
 
-    python benchmarks/thesis_cases.py              # 10 seeds, prints the table
-    python benchmarks/thesis_cases.py --quick      # 2 seeds
-    python benchmarks/thesis_cases.py --write      # and updates docs/validation.md, docs/images
+    python benchmarks/chain/thesis_cases.py              # 10 seeds, prints the table
+    python benchmarks/chain/thesis_cases.py --quick      # 2 seeds
+    python benchmarks/chain/thesis_cases.py --write  # and updates docs/validation.md, docs/images
 
 Case 1: speed 20, 50, 100 % without payload. Case 2: payload 0, 1, 2 kg at full speed. Per case
 and seed two recordings of six axes, four cycles each: one healthy, one of a later session with
@@ -36,7 +36,7 @@ from opamc_cli.stages.recordings import simulate
 from opamc_cli.stages.tuning import sweep
 from opamc_cli.storage.schemas import files
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FAULT_AXIS, NORMAL_AXIS = 3, 2
 SPEEDS, PAYLOADS = (20, 50, 100), (0, 1, 2)
 CONDITIONS = ((20, 0), (50, 0), (100, 0), (100, 1), (100, 2))
@@ -305,7 +305,7 @@ def document(study: Study, n_seeds: int) -> str:
         BEGIN,
         "",
         f"Seeds {FIRST_SEED} to {FIRST_SEED + n_seeds - 1}; "
-        "`python benchmarks/thesis_cases.py --write` makes this section.",
+        "`python benchmarks/chain/thesis_cases.py --write` makes this section.",
         "",
         "| | headline result | thesis | testbed | holds |",
         "|---|---|---|---|---|",

@@ -12,9 +12,9 @@ each start what was said is held against what is so:
 - `--dry-run` changes nothing and foresees all nights that are done;
 - metrics, page, `--json` and history tell the same alarms.
 
-    python benchmarks/nightly_walk.py 9000 40                # seeds 9000 to 9039, 3 s each
-    python benchmarks/nightly_walk.py 9027 1 --shrink 60     # the fewest steps found in 60 s
-    python benchmarks/nightly_walk.py 9027 1 --verbose       # each step, and what was said
+    python benchmarks/nightly/nightly_walk.py 9000 40                # seeds 9000 to 9039, 3 s each
+    python benchmarks/nightly/nightly_walk.py 9027 1 --shrink 60  # the fewest steps found in 60 s
+    python benchmarks/nightly/nightly_walk.py 9027 1 --verbose       # each step, and what was said
 
 In walks of even seeds no file is lost or changed.
 """

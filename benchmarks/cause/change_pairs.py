@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent / "sources"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
 from simulator import simulate as simulate_joint
 
 from opamc_cli.config.testbed import load_testbed
@@ -20,7 +20,7 @@ from opamc_cli.joint.motion.track import Joint
 from opamc_cli.testbed.parameters import Effect
 from opamc_cli.testbed.robot import simulate as simulate_robot
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 RATE_HZ = 2048.0
 SPEEDS_PERCENT = (100.0, 50.0, 20.0)
 BASELINE_SESSIONS, TARGET_SESSIONS = 6, 2

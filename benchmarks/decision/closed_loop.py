@@ -3,17 +3,20 @@
 Three joints each, six baseline nights and one more; the hall's temperature (5 K from night to
 night) is not logged. The second joint has a fault.
 
-    python benchmarks/closed_loop.py --robots 20 --first 1000
-    python benchmarks/closed_loop.py --robots 100 --first 2000 --sizes   # healthy ones alone
+    python benchmarks/decision/closed_loop.py --robots 20 --first 1000
+    python benchmarks/decision/closed_loop.py --robots 100 --first 2000 --sizes # healthy alone
 """
 
 import argparse
+import sys
 import tempfile
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from sources.closed_loop_joint import FAULTS, ClosedLoopJoint, draw_joint, record
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
+from closed_loop_joint import FAULTS, ClosedLoopJoint, draw_joint, record
 
 from opamc_cli import api
 from opamc_cli.errors import OpamcError

@@ -3,18 +3,21 @@
 Single joints of the closed loop, six baseline nights; a hall that is 5 K colder or warmer from
 night to night. Each recording is so many rounds of the program long.
 
-    python benchmarks/rounds.py --first 9500 --joints 40 --rounds 1.4 1.8
-    python benchmarks/rounds.py --first 9500 --joints 40 --rounds 1.4 1.8 --anywhere
+    python benchmarks/decision/rounds.py --first 9500 --joints 40 --rounds 1.4 1.8
+    python benchmarks/decision/rounds.py --first 9500 --joints 40 --rounds 1.4 1.8 --anywhere
 """
 
 import argparse
+import sys
 import tempfile
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from sources.closed_loop_joint import LOOP_HZ, draw_joint, program, record
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
+from closed_loop_joint import LOOP_HZ, draw_joint, program, record
 
 from opamc_cli.config import load_config
 from opamc_cli.decision.judge import judge

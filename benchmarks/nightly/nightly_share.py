@@ -1,6 +1,6 @@
 """Of the computing of many robots' nights, the share that is spent in the diagnoses themselves.
 
-python benchmarks/nightly_share.py --robots 20 --nights 12     # 200 nights are judged
+python benchmarks/nightly/nightly_share.py --robots 20 --nights 12     # 200 nights are judged
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """Speed of the compiled kernels beside public tools, as ratios taken in one process.
 
-Run with ``python benchmarks/kernels.py`` (``--quick`` for the short form). Every figure is the best
-of a few repetitions on one thread; the machine's other load moves both sides of a ratio.
+Run with ``python benchmarks/chain/kernels.py`` (``--quick`` for the short form). Every figure is
+the best of a few repetitions on one thread; the machine's other load moves both sides of a ratio.
 """
 
 # Threads are pinned before the libraries that read the variables are imported.

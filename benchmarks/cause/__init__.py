@@ -1,0 +1,1 @@
+"""Pairs of recordings, and the plain rival, of benchmarks/cause.py."""

@@ -1,0 +1,1 @@
+"""Cell, steps and checks of benchmarks/nightly/nightly_walk.py."""

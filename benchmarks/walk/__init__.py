@@ -1,1 +1,0 @@
-"""Cell, steps and checks of benchmarks/nightly_walk.py."""
