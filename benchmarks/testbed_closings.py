@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent / "sources"))
 from testbed_closing import EFFECTS, SENSING, close_on_testbed, error_on, names_of, record
 
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.fit.model import Fit
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Closing:
     floor_a: float
 
 
-def close_one(effect: str, sensing: str, seed: int, healthy_a: Floats) -> Closing:
+def close_one(effect: str, sensing: str, seed: int, healthy: Fit) -> Closing:
     """Switch an effect on and close the loop."""
     loop = close_on_testbed((effect,), sensing, seed)
     return Closing(
@@ -40,7 +40,7 @@ def close_one(effect: str, sensing: str, seed: int, healthy_a: Floats) -> Closin
         verdict=loop.verdict,
         before_a=loop.rmse_before_a,
         after_a=loop.rmse_after_a,
-        floor_a=error_on(healthy_a, loop),
+        floor_a=error_on(healthy, loop),
     )
 
 
@@ -76,12 +76,12 @@ def run(seeds: range, removed_seeds: range, *, verbose: bool) -> None:
         Print every closing that is not as it should be.
     """
     began = time.time()
-    healthy: dict[tuple[str, int], Floats] = {}
+    healthy: dict[tuple[str, int], Fit] = {}
     wrong = silent = 0
     for sensing in SENSING:
         for seed in seeds:
             loop = close_on_testbed((), sensing, seed)
-            healthy[sensing, seed] = loop.before.residual_a
+            healthy[sensing, seed] = loop.before
             wrong += any(step.named for step in loop.steps)
             silent += loop.verdict == "nothing-missing"
             if verbose and loop.verdict != "nothing-missing":

@@ -12,7 +12,7 @@ from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.motion.track import Floats, Joint
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.testbed.parameters import Effect
 from opamc_cli.testbed.robot import AxisRecording, simulate
 
@@ -92,13 +92,16 @@ def close_on_testbed(
     return close_loop(fitted, built_in_library(without), seed)
 
 
-def error_on(healthy_a: Floats, loop: Loop) -> float:
-    """Error of a healthy session, from its residual, on the samples that judged another's loop.
+def error_on(healthy: Fit, loop: Loop) -> float:
+    """Error of a healthy session on the samples that judged another's loop.
 
-    Which samples corners of the motion spoil depends on the noise of the current.
+    Which samples corners of the motion spoil, and which stand for all, depends on the noise of the
+    current.
     """
-    sealed = loop.after.dataset.sharp.sealed
-    return float(np.sqrt(np.mean(healthy_a[sealed] ** 2)))
+    dataset, healthy = loop.after.opened.dataset, healthy.opened
+    judged = dataset.fine.track.time_s[dataset.sharp.sealed]
+    there = np.isin(np.rint(RATE_HZ * healthy.dataset.fine.track.time_s), np.rint(RATE_HZ * judged))
+    return float(np.sqrt(np.mean(healthy.residual_a[there] ** 2)))
 
 
 def names_of(loop: Loop) -> list[set[str]]:

@@ -1,7 +1,6 @@
 """Where an arm's joints are, from the currents of them all."""
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from opamc_cli.arm.torques import (
     GRAVITY_M_S2,
@@ -114,6 +113,8 @@ class Finder:
 
     def fitted(self, letters: str, ways: Floats, steps: int) -> Floats:
         """Fit ways and zeros, beside links' parameters that are best for each."""
+        from scipy.optimize import least_squares  # 0.2 s, which a joint by itself does not need
+
         sizes = np.sqrt(self.left(letters, ways))
 
         def left(free: Floats) -> Floats:

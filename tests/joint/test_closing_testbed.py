@@ -14,8 +14,9 @@ from testbed_closing import (
     names_of,
 )
 
+from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import Loop
-from opamc_cli.joint.motion.track import Floats, Joint
+from opamc_cli.joint.motion.track import Joint
 from tests.marks import long
 
 SEED = 100
@@ -43,14 +44,14 @@ CASES = [
 
 
 @pytest.fixture(scope="session")
-def healthy() -> dict[str, Floats]:
-    """Residual of the joint that lacks nothing, by what is logged."""
-    return {sensing: declared_on_testbed(sensing, SEED).residual_a for sensing in SENSING}
+def healthy() -> dict[str, Fit]:
+    """The joint that lacks nothing, by what is logged."""
+    return {sensing: declared_on_testbed(sensing, SEED) for sensing in SENSING}
 
 
-def fall(loop: Loop, healthy_a: Floats) -> float:
+def fall(loop: Loop, healthy: Fit) -> float:
     """Share of the sealed mean square above that of the healthy joint that is gone."""
-    excess = loop.rmse_before_a**2 - error_on(healthy_a, loop) ** 2
+    excess = loop.rmse_before_a**2 - error_on(healthy, loop) ** 2
     return float((loop.rmse_before_a**2 - loop.rmse_after_a**2) / excess)
 
 

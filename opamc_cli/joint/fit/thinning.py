@@ -7,9 +7,9 @@ import numpy as np
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Track, excerpt
 
-MOST_SAMPLES = 50_000
-"""Of more moving samples evenly spread parts stand for all, of the open groups and of the sealed
-ones alike. What is shorter is then never dearer."""
+MOST_SAMPLES = 30_000
+"""Of more moving samples parts, evenly spread over open and sealed groups alike, stand for all.
+With 50 000 a minute takes 1.4 times as long, and as many hidden effects are named (30 of 34)."""
 FEWEST_GROUPS = 12
 """What happens at some time is consistent over groups only if there are some on both sides."""
 LEAD_S = 1.0

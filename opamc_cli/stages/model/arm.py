@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.signal import savgol_filter
 from threadpoolctl import threadpool_limits
 
 from opamc_cli.arm.finder import FEWEST, MOST_AXES, SAMPLES, Finder, chain_of
@@ -216,10 +215,10 @@ def _logged(runs: Sequence[Run], fewest: int) -> tuple[Floats, Floats]:
     axes = sorted(set.intersection(*(set(run.positions) for run in runs)))
     fed = [axis for axis in axes if all(f"axis{axis}_current" in run.columns for run in runs)]
     first = runs[0].path
-    if len(fed) < max(len(axes) / 2, 2):
+    if len(fed) < max(len(axes) / 2, fewest):
         msg = f"{first}: an arm is found from the positions and currents of all axes: log them"
         raise InputError(msg)
-    motions, currents = [], []
+    pieces = []
     for run, start, stop in _pieces(runs):
         names = [run.positions[axis] for axis in axes], [f"axis{axis}_current" for axis in fed]
         samples = run.read([*names[0], *names[1]], start, stop)
@@ -231,6 +230,19 @@ def _logged(runs: Sequence[Run], fewest: int) -> tuple[Floats, Floats]:
         if places.shape[1] <= max(3 * window, (1 - MOST_MISSING) * known.size):
             msg = f"{run.path}: {places.shape[1]} samples are known on all axes: too few"
             raise InputError(msg)
+        pieces.append((places, drawn, window, rate))
+    travels = np.ptp(np.concatenate([places for places, *_ in pieces], axis=1), axis=1)
+    moved = travels > SLOWEST_SHARE * travels.max()
+    moving_fed = np.count_nonzero(moved & np.isin(axes, fed))
+    if moving_fed < fewest:
+        msg = f"{first}: {moving_fed} axes with a current move, {fewest} are needed"
+        raise InputError(msg)
+    if axes != list(range(1, len(axes) + 1)) or len(axes) > MOST_AXES:
+        raise MisnumberedError(first, axes)
+    from scipy.signal import savgol_filter  # 0.3 s to load, which a joint by itself does not need
+
+    motions, currents = [], []
+    for places, drawn, window, rate in pieces:
         smooth = [savgol_filter(places, window, 3, order, 1 / rate) for order in range(3)]
         motions.append(np.array(smooth)[:, :, window:-window])
         currents.append(np.full((len(axes), places.shape[1] - 2 * window), np.nan))
@@ -241,10 +253,6 @@ def _logged(runs: Sequence[Run], fewest: int) -> tuple[Floats, Floats]:
     if np.count_nonzero(moving) < FEWEST:
         msg = f"{first}: {np.count_nonzero(moving)} samples of motion, {FEWEST} are needed"
         raise InputError(msg)
-    moves = np.ptp(motion[0], axis=1) > SLOWEST_SHARE * np.ptp(motion[0], axis=1).max()
-    misnumbered = axes != list(range(1, len(axes) + 1)) or len(axes) > MOST_AXES
-    if misnumbered and np.count_nonzero(moves & np.isin(axes, fed)) >= fewest:
-        raise MisnumberedError(first, axes)
     return motion[:, :, moving], current[:, moving]
 
 

@@ -260,7 +260,7 @@ def test_a_slow_effect_is_judged_beside_a_ripple_that_is_fitted_with_it():
     def friction(q, v, a, t):
         return np.sign(v) * np.abs(v) ** 0.3
 
-    fit = plain_fit(joint_of("steps of torque", friction, rate=2000.0, seconds=24.0))
+    fit = plain_fit(joint_of("steps of torque", friction, rate=1200.0, seconds=24.0))
     # Fitted by itself, what a drive makes of this ripple takes up most of the friction.
     forms = {"order": 2.0, "direction": 1.0, "answer": 1.0, "top_hz": 20.0}
     chain = extended(chain_of(fit, 0), Term(LIBRARY["ripple"], forms))

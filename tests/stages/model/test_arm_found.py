@@ -69,7 +69,7 @@ def test_an_arm_is_found_beside_a_payload_that_changes(tmp_path, capsys):
         ),
         (1, 8, 2000, True, 3, "is found, not one of axes 1, 2, 3, 4, 5, 6, 7, 8: number"),
         (1, 3, 12, True, 3, "12 samples are known on all axes: too few"),
-        (1, 3, 2000, False, 3, "0 samples of motion, 250 are needed"),
+        (1, 3, 2000, False, 3, "0 axes with a current move, 2 are needed"),
         (1, 3, 60, True, 3, "46 samples of motion, 250 are needed"),
         (1, 0, 2000, True, 3, "from the positions and currents of all axes"),
     ],
