@@ -1,7 +1,7 @@
 """How often the cause of a change is named rightly, and a healthy joint is left in peace.
 
     python benchmarks/cause.py --quick
-    python benchmarks/cause.py --seeds 30 --write   # and docs/validation.md
+    python benchmarks/cause.py --seeds 30 --write   # and docs/validation/cause.md
 
 Every pair holds six baseline and two target sessions of one joint; what changed between them is
 known; the plain rival is asked of the same. Half of the pairs are the virtual robot's (axis and
@@ -93,7 +93,7 @@ def main() -> None:
     parser.add_argument("--only", help="changes, separated by commas")
     parser.add_argument("--source", choices=("robot", "joint"))
     parser.add_argument("--verbose", action="store_true", help="print every pair that went wrong")
-    parser.add_argument("--write", action="store_true", help="update docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="update docs/validation/cause.md")
     arguments = parser.parse_args()
     began = time.time()
     count = 3 if arguments.quick else arguments.seeds
@@ -131,7 +131,7 @@ def main() -> None:
     print(f"{np.median(spent):.1f} s a pair in the middle, {max(spent):.1f} s at most")
     print(f"{time.time() - began:.0f} s in all")
     if arguments.write:
-        path = ROOT / "docs" / "validation.md"
+        path = ROOT / "docs" / "validation" / "cause.md"
         before, rest = path.read_text().split(BEGIN)
         note = (
             f"Seeds {seeds.start} to {seeds.stop - 1}: six baseline and two target sessions a "

@@ -116,8 +116,8 @@ def keep(file: Path, rows: list[run.Row], names: list[str]) -> None:
 
 
 def document(rows: list[run.Row], names: list[str]) -> None:
-    """Put measured joints row by row, and the rest in sums, into docs/validation.md."""
-    path = Path(__file__).parents[1] / "docs" / "validation.md"
+    """Put measured joints row by row, and the rest in sums, into docs/validation/loop.md."""
+    path = Path(__file__).parents[1] / "docs" / "validation" / "loop.md"
     before, rest = path.read_text(encoding="utf-8").split(BEGIN)
     measured_rows = [row for row in rows if row["source"] in MEASURED]
     section = [table.errors(measured_rows, names), "", table.totals(rows, names), "",
@@ -147,7 +147,7 @@ def main() -> None:
     parser.add_argument("--compare", type=Path, help="an earlier JSON of the same seeds")
     parser.add_argument("--show", type=Path, help="print the tables of a JSON, run nothing")
     parser.add_argument("--keep", type=Path, help="write the rows shortened, to stay as a JSON")
-    parser.add_argument("--write", action="store_true", help="update docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="update docs/validation/loop.md")
     parser.add_argument("--list", action="store_true", help="print the cases, run nothing")
     arguments = parser.parse_args()
     names = list(listed(arguments.contestants))

@@ -2,7 +2,7 @@
 
     python benchmarks/chain/boundaries.py            # 20, 50, 100 %; 0, 1, 2 kg; down to 20 dB
     python benchmarks/chain/boundaries.py --quick
-    python benchmarks/chain/boundaries.py --write    # and updates docs/validation.md
+    python benchmarks/chain/boundaries.py --write    # and updates docs/validation/chain.md
 
 Every axis is recorded alone with sensor noise set to a signal-to-noise ratio: power of the phase
 current while the axis moves, over the power of the noise. Seeds begin at 1010: on earlier ones two
@@ -89,7 +89,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--quick", action="store_true", help="one seed, axes 2 and 6")
-    parser.add_argument("--write", action="store_true", help="update docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="update docs/validation/chain.md")
     arguments = parser.parse_args()
     seeds = 1 if arguments.quick else arguments.seeds
     axes = (2, 6) if arguments.quick else (1, 2, 3, 4, 5, 6)
@@ -120,7 +120,7 @@ def main() -> None:
         )
         print(lines[-1], flush=True)
     if arguments.write:
-        path = ROOT / "docs" / "validation.md"
+        path = ROOT / "docs" / "validation" / "chain.md"
         before, rest = path.read_text().split(BEGIN)
         note = (
             f"Seeds {arguments.first_seed} to {arguments.first_seed + seeds - 1}, six axes, four "

@@ -2,7 +2,7 @@
 
     python benchmarks/chain/thesis_cases.py              # 10 seeds, prints the table
     python benchmarks/chain/thesis_cases.py --quick      # 2 seeds
-    python benchmarks/chain/thesis_cases.py --write  # and updates docs/validation.md, docs/images
+    python benchmarks/chain/thesis_cases.py --write      # and docs/validation/chain.md, images
 
 Case 1: speed 20, 50, 100 % without payload. Case 2: payload 0, 1, 2 kg at full speed. Per case
 and seed two recordings of six axes, four cycles each: one healthy, one of a later session with
@@ -10,7 +10,7 @@ the flexspline of axis 3 ground over a quarter of its perimeter. The axes do not
 other in the testbed, so they are recorded at once instead of one after another.
 
 Seeds begin at 3000: the testbed's parameters were chosen on seeds below 100, and corrected twice
-after others had been seen, which docs/validation.md tells.
+after others had been seen, which docs/validation/chain.md tells.
 """
 
 import argparse
@@ -300,7 +300,7 @@ def feature_rows(study: Study) -> list[str]:
 
 
 def document(study: Study, n_seeds: int) -> str:
-    """Section of docs/validation.md."""
+    """Section of docs/validation/chain.md."""
     lines = [
         BEGIN,
         "",
@@ -321,7 +321,7 @@ def document(study: Study, n_seeds: int) -> str:
         *feature_rows(study),
         "",
         *(
-            f"![{title}](images/{name})\n"
+            f"![{title}](../images/{name})\n"
             for name, title in (
                 ("tau_sweep.png", "JSD over τ at 20, 50 and 100 % (as Figures 5-4 to 5-6)"),
                 ("jsd_scatter.png", "JSD of every segment, and histograms (5-11, 5-12)"),
@@ -366,7 +366,7 @@ def main() -> None:
     (out / "thesis_cases.json").write_text(json.dumps(done))
     if arguments.write:
         draw_all(study, ROOT / "docs" / "images", NORMAL_AXIS, FAULT_AXIS)
-        path = ROOT / "docs" / "validation.md"
+        path = ROOT / "docs" / "validation" / "chain.md"
         text = path.read_text()
         before, rest = text.split(BEGIN)
         path.write_text(before + document(study, seeds) + rest.split(END)[1])

@@ -572,7 +572,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--quick", action="store_true", help="4 robots, 3 conditions")
     parser.add_argument(
-        "--write", action="store_true", help="put the figures in docs/validation.md"
+        "--write", action="store_true", help="put the figures in docs/validation/decision.md"
     )
     options = parser.parse_args()
     first, stop = map(int, options.seeds.split(":"))
@@ -601,7 +601,7 @@ def main() -> None:
     print(text)
     print(f"\n{len(jobs)} fleets in {time.perf_counter() - started:.0f} s")
     if options.write:
-        write_section(ROOT / "docs" / "validation.md", text)
+        write_section(ROOT / "docs" / "validation" / "decision.md", text)
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ class LoadFriction(Effect):
     """Meshing losses: dry friction in proportion to the load's magnitude, or to its square.
 
     The square is what a strain wave gear's teeth, preloaded against each other, come near (two of
-    a UR10's joints, docs/validation.md). What accelerates the rotor itself does not pass the gear:
-    `inertia_share` is the part of the inertia's current that does.
+    a UR10's joints, docs/validation/machines.md). What accelerates the rotor itself does not pass
+    the gear: `inertia_share` is the part of the inertia's current that does.
     """
 
     name = "load_friction"

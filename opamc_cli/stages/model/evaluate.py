@@ -39,7 +39,7 @@ FAMILIAR = 10.0
 """Leverage, in means of the recordings that a model was closed on, up to which it knows a sample:
 of 53 measured joints those whose error rose eightfold on another program had 83 to 100 % of it
 beyond, all others 0 to 75 %; of a robot met later three of four such were beyond
-(docs/validation.md)."""
+(docs/validation/machines.md)."""
 UNTOLD = (
     "axis {}: the model does not tell on what motion it was closed; close it again to hear whether "
     "these runs go beyond it"

@@ -20,6 +20,7 @@ from opamc_cli.stages.report.wording.loop import (
     far_from_noise,
     loop_phrase,
     remains,
+    unreliable,
 )
 
 
@@ -159,6 +160,15 @@ def test_what_corners_alone_show_is_far_from_noise_too(logged: float, told: str 
     entry["after"] |= {"as_logged_a": logged}
     found = far_from_noise(entry)
     assert found is None if told is None else (found or "").startswith(told)
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.0, True), (0.8, False)])
+def test_a_part_that_was_found_does_not_hide_what_is_left(share: float, said: bool) -> None:
+    """Friction that grows while a joint rests: a fifth had a name, 8 times the noise were left."""
+    entry = left_alone(0.2115, 0.0253) | {"verdict": "partial", "ceiling": {"share": share}}
+    entry |= {"steps": [{"named": True}]}
+    told = [why for why in unreliable(entry) if "8 times the noise" in why]
+    assert bool(told) == said
 
 
 @pytest.mark.parametrize("error", [0.0204, 0.0216, 0.028])

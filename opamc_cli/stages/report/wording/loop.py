@@ -81,13 +81,15 @@ def unreliable(entry: Mapping[str, Any]) -> list[str]:
         One object of loop.json's `axes`.
     """
     # of nothing missing the headline says it
-    far = far_from_noise(entry) if entry.get("verdict") == "closed" else None
+    far = far_from_noise(entry) if entry.get("steps") else None
     reasons = entry.get("fails"), _sealed_apart(entry), far, _unconfirmed(entry)
     return [why for why in reasons if why]
 
 
 def far_from_noise(entry: Mapping[str, Any]) -> str | None:
-    """Return that a loop of which no more is said to lack leaves far more than noise, if it does.
+    """Return that far more than noise is left where nothing else says that more lacks, if it is.
+
+    That is where nothing else was found missing, and where what can be explained is not known.
 
     Parameters
     ----------
@@ -95,7 +97,9 @@ def far_from_noise(entry: Mapping[str, Any]) -> str | None:
         One object of loop.json's `axes`.
     """
     noise, after = entry.get("noise_a"), entry.get("after") or {}
-    if entry.get("verdict") not in ("closed", "nothing-missing") or not noise:
+    ended = entry.get("verdict") in ("closed", "nothing-missing")
+    ended |= entry.get("verdict") == "partial" and not ceiling_known(entry)
+    if not (ended and noise):
         return None
     left, logged = (after.get(key) or 0.0 for key in ("rmse_a", "as_logged_a"))
     how = ""
