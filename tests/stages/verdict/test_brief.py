@@ -36,6 +36,18 @@ def test_a_current_that_became_smooth_is_no_worn_gear(size, loudest, first):
     assert ("filters" in told) == (first == "filters")
 
 
+@pytest.mark.parametrize(("state", "first"), [("fault", "Inspect"), ("changed", "Record again")])
+def test_what_nothing_explains_is_recorded_again_before_a_gear_is_opened(state, first):
+    """A tool put back 1 cm off had the gear inspected."""
+    judged = SimpleNamespace(
+        state=state, witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = brief(judged, Bundle([], {}), None, in_vain=True)
+    assert told["inspect"].startswith(first)
+    assert "inspect the gear: backlash" in told["inspect"].lower()
+    assert ("repeat" in told["against"]) == (state == "fault")
+
+
 @pytest.mark.parametrize(
     ("explained", "harmless", "first"),
     [
