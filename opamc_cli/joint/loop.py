@@ -195,7 +195,7 @@ def _confirmed(chain: Chain) -> tuple[Chain, list[Term]]:
         named = [k for k, term in enumerate(chain.terms) if not term.effect.unnamed]
         rest = {k: without(chain, k, rounds=1).fit.rmse(sealed=True) for k in named}
         place = min(rest, key=rest.__getitem__, default=0)
-        least = (1 - LEAST_SHARE) * rest.get(place, np.inf) ** 2
+        least = (1 - PRICE) * rest.get(place, np.inf) ** 2
         if chain.fit.rmse(sealed=True) ** 2 <= least:
             return chain, back
         back.append(chain.terms[place])
@@ -203,10 +203,7 @@ def _confirmed(chain: Chain) -> tuple[Chain, list[Term]]:
 
 
 def _without_names(start: Chain, named: list[Named], unnamed: Pool) -> Chain:
-    """Explain by smooth functions alone what several names may hold that are all none.
-
-    By no lines, whose sum is any motion that repeats, and no shift in the place of one with a name.
-    """
+    """Explain by smooth functions alone, no lines, what several names hold that may all be none."""
     measuring = any(one.term.effect.as_smoothing for one in named)
     library = {
         name: one
@@ -271,7 +268,7 @@ def _opened(
     ceilings = [(ceiling(before, chain.fit), chain) for chain in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
     # Nor is what was added to look better for the names that were taken back.
-    least_after = max((fit.rmse(sealed=True) for fit in searched), default=0.0)
+    least_after = max((fit.rmse(sealed=True) for fit in searched if steps), default=0.0)
     rmse_named, rmse_after = (max(f.rmse(sealed=True), least_after) for f in (named, after))
     # The declared model is not to look worse than where it was fitted best.
     least = min(before, best_before, key=lambda fit: fit.rmse(sealed=True))

@@ -137,9 +137,8 @@ def _common_course(
 ) -> tuple[Floats, tuple[float, ...]] | None:
     """One cycle of a path that repeats, NaN where few cycles have current, and all gaps guessed.
 
-    From one stretch of current to the next the angle changes by what most cycles say. What a whole
-    cycle leaves was turned in the gap in which cycles differ most, if no two of three agree there
-    (in two gaps or more: guesses), else in the longest. None if a tenth of the travel is left.
+    From one stretch to the next it changes by what most cycles say; what is left was turned in the
+    gap in which cycles differ most, else in the longest. None if a tenth of the travel is left.
     """
     cycles = path.size // period
     folded = path[: cycles * period].reshape(cycles, period)
