@@ -5,7 +5,7 @@ import os
 import shlex
 import shutil
 import sqlite3
-from datetime import date, timedelta
+from datetime import UTC, date, datetime, timedelta
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -43,6 +43,12 @@ def test_a_clock_that_tells_no_night_is_said_until_it_is_set(cell, logs, opamc):
         # neither the first night of the baseline, nor a last one that no other can follow
         assert states(cell) == ["failed", "baseline", "baseline", "baseline", "done"]
         assert "could not be judged" in (cell.parent / "nightly" / "index.html").read_text()
+    # judged as a night, it had all other robots missed
+    set_clock(last, (datetime.now(UTC) + timedelta(hours=26)).isoformat(timespec="seconds"))
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert "which lies in the future; check the clock" in ended.out
+    assert "no file of" not in ended.out
     set_clock(last, f"{night(4)}T22:00:00+00:00")
     ended = opamc("nightly", cell, "--quiet")
     assert (ended.code, ended.out) == (ExitCode.DONE, "")

@@ -27,6 +27,9 @@ from opamc_cli.storage.schemas import files
 EARLIEST_NIGHT = "2001-01-01"
 """Clocks that were never set begin in 1970, 1980 or 2000."""
 
+CLOCKS_DIFFER = timedelta(hours=1)
+"""A local time that was stated as UTC in summer, or a logger whose clock nobody sets."""
+
 REMEMBER_EVERY = 50
 """Files that are read between two writes to the history: what a kill costs."""
 
@@ -169,7 +172,9 @@ class _Reader:
         self._new: list[FileRow] = []
         self._day_starts: dict[str, float] = {}
         # the logger's day may have begun already
-        self._latest_night = (datetime.now(UTC).date() + timedelta(1)).isoformat()
+        self._now = datetime.now(UTC)
+        self._today = self._now.date().isoformat()
+        self._latest_night = (self._now.date() + timedelta(1)).isoformat()
         self._cell = cell
 
     def known(self, log: LogFile) -> Iterator[Recording]:
@@ -225,6 +230,13 @@ class _Reader:
                 "this machine's"
             )
             night = None
+        elif night and night >= self._today and _began_after(facts.started_at, self._now):
+            # the night of tomorrow would have all other robots missed
+            facts = Facts(
+                error=f"{log.path}: began at {facts.started_at}, which lies in the future; check "
+                "the clock of the logger, and this machine's"
+            )
+            night = None
         return Recording(log, night or "", row.sha256, facts)
 
     def finish(self) -> None:
@@ -237,6 +249,15 @@ class _Reader:
             config = self._cell.diagnosis_of(robot, "cell")
             self._day_starts[robot] = config.score.day_starts_at
         return self._day_starts[robot]
+
+
+def _began_after(started_at: str | None, now: datetime) -> bool:
+    """Whether a stated instant is later than clocks differ; one without a zone may be anywhere."""
+    try:
+        began = datetime.fromisoformat(started_at or "")
+    except ValueError:
+        return False
+    return began.tzinfo is not None and began > now + CLOCKS_DIFFER
 
 
 def _is_free(robot: str) -> bool:
