@@ -197,11 +197,7 @@ def _told(compared: Compared, terms: tuple[Term, ...]) -> Joint | None:
 
 
 def _of_lines(periodic: list[Reading], whole: float, loaded: bool, library: Library) -> list[Cause]:
-    """Make one cause of the readings of what grew; of a joint `loaded` otherwise more is asked.
-
-    The first tells what it is, the others make it no less. `whole` is the mean square, A^2, that
-    has changed in all.
-    """
+    """Make one cause of what grew, of `whole` A^2 in all; of a `loaded` joint more is asked."""
     named = []
     for one in periodic:
         if one.effect in library:

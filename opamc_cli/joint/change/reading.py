@@ -248,11 +248,7 @@ def _evidence(line: Line, order: float, resolution: float) -> Parameters:
 
 
 def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> tuple[float, float]:
-    """Where the lines lie between the orders of the circular spline (0) and the flexspline (1).
-
-    Weighted mean over the harmonics, which lie the further apart the higher they are, and its
-    standard error.
-    """
+    """Where lines lie from the circular spline's orders (0) to the flexspline's (1); its error."""
     ratio = track.joint.gear_ratio or USUAL_RATIO
     places, weights = [], []
     for line in lines:

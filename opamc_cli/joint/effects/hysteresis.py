@@ -46,6 +46,12 @@ class Hysteresis(Effect):
         return stack(state)
 
 
+class AnyHysteresis(Hysteresis):
+    """A declared one: a bearing's, too, which is no effect that a joint would lack."""
+
+    lengths = (1 / 5000, 1 / 2, 15)
+
+
 @njit(cache=True)
 def dahl_state(position_rad: Floats, length_rad: float) -> Floats:
     """Solve Dahl's equation ``dz/dq = (1 - z sgn(dq)) / length`` along a path, (n,).

@@ -167,7 +167,7 @@ def lay(
             if why is not None:
                 msg = (
                     f"Effect {effect.name!r} is declared, but axis {axis} of {named} cannot show "
-                    f"it: {why}; log the channel or drop the effect from the model"
+                    f"it: {why}; record what it asks for, or drop the effect from the model"
                 )
                 raise ConfigError(msg)
         track = dataset.coarse.track
