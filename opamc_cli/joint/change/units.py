@@ -158,10 +158,7 @@ def read_side(
 
 
 def side_by_side(before: Sequence[Track], after: Sequence[Track]) -> Compared:
-    """Lay tracks of both sides one after the other, each group a unit of its own.
-
-    Units of which the coarse grid shows next to nothing are left out.
-    """
+    """Lay both sides' tracks in a row, each group a unit if the coarse grid shows enough of it."""
     tracks, late = [], np.zeros(0, dtype=bool)
     for side, new in ((before, False), (after, True)):
         for track in side:
@@ -176,6 +173,9 @@ def side_by_side(before: Sequence[Track], after: Sequence[Track]) -> Compared:
     width = (1.4 if noisy else 0.8) / float(np.sum(kernel**2))
     factor = max(int(track.rate_hz / COARSE_RATE_HZ), int(width), 1)
     coarse = coarsen(track, factor)
+    # Of short motions in a slow log it may leave nothing.
+    if not np.any(coarse.moving & (coarse.group >= 0)):
+        factor, coarse = 1, track
     fine = replace(track, moving=track.moving & track.clear)
     grouping = Grouping(track.group, (), (), "units")
     return Compared(Dataset(grid_of(fine), grid_of(coarse), factor, grouping), late).enough()
