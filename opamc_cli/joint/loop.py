@@ -208,7 +208,7 @@ def _without_names(start: Chain, named: list[Named], unnamed: Pool) -> Chain:
     library = {
         name: one
         for name, one in unnamed.library.items()
-        if not (one.fast or (one.as_smoothing and measuring))
+        if not (one.fast or (one.as_smoothing and measuring))  # or it would be it without its name
     }
     return worth_their_price(beam(start, replace(unnamed, library=library), width=1))
 
@@ -267,7 +267,7 @@ def _opened(
     # What either explains can be explained.
     ceilings = [(ceiling(before, chain.fit), chain) for chain in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
-    # Nor is what was added to look better for the names that were taken back.
+    # Nor is what was added to look better for names that were taken back by these very data.
     least_after = max((fit.rmse(sealed=True) for fit in searched if steps), default=0.0)
     rmse_named, rmse_after = (max(f.rmse(sealed=True), least_after) for f in (named, after))
     # The declared model is not to look worse than where it was fitted best.
@@ -276,7 +276,7 @@ def _opened(
     scale = (before.rmse(sealed=True) / max(rmse_before, 1e-300)) ** 2
     found = Ceiling(max(1.0 - scale * (1.0 - found.share), 0.0), scale * found.standard_error)
     if steps and rmse_after**2 > (1.0 - PRICE) * rmse_before**2:
-        # Functions without a name first, then all: steps are never chosen among by the sealed data.
+        # Functions without a name first, then all: no set of steps is sought that holds best there.
         hold = rmse_named**2 <= (1.0 - PRICE) * rmse_before**2
         why = "does not hold on the sealed data"
         refused += [replace(one.trial, why_not=why) for one in steps if not (one.named and hold)]

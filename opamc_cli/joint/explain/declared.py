@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.effects.hysteresis import AnyHysteresis
+from opamc_cli.joint.effects.hysteresis import AnyHysteresis, Hysteresis
 from opamc_cli.joint.effects.time_delay import TimeDelay
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.explain.sides import turned_by
@@ -176,7 +176,7 @@ def declared_fit(dataset: Dataset, declared: Declared) -> Fit:
     # Of several each once more: the first was searched beside none of the others.
     for place in searched * min(len(searched), 2):
         effect, dataset = declared[place][0], fitted.dataset
-        effect = AnyHysteresis() if effect.name == AnyHysteresis.name else effect
+        effect = AnyHysteresis() if type(effect) is Hysteresis else effect
         beside = tuple(terms[key] for key in sorted(terms) if key != place)
         chain = chain_of(fit_terms(dataset, beside) if place in terms else fitted, 0)
         if found := candidates(chain, Pool.of(dataset, {effect.name: effect}), every=True):

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closing import MODEL, close_on, close_recording, joint_of, plain_fit
+from closing import MODEL, close_on, close_recording, fit_declared, joint_of, plain_fit
 from simulator import simulate
 
+from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import Ways, declared_fit
 from opamc_cli.joint.fit.model import Term, fit_terms
@@ -64,6 +65,20 @@ def test_parameters_are_searched_again_beside_what_was_found():
     assert after.terms[-1].parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.02)
     # Where that is no better, nothing is done again.
     assert ways.fit_anew(after, (gravity,)) is None
+
+
+@pytest.mark.parametrize("share", [0.002, 0.1])
+def test_a_declared_hysteresis_may_be_as_short_as_a_bearing_s(share):
+    """Healthy joints whose friction builds up over a thousandth of the travel lacked presliding."""
+    lengths = []
+
+    def bearing(q, v, a, t):
+        lengths.append(share * np.ptp(q))
+        return dahl_state(q, lengths[-1]) - np.sign(v)
+
+    recording = joint_of("cyclic", bearing, strength=8.0, rate=1000.0)
+    fitted = fit_declared([recording], base=(*MODEL, "inertia", "gravity", "hysteresis"))
+    assert fitted.terms[-1].parameters["length_rad"] == pytest.approx(lengths[-1], rel=0.2)
 
 
 def test_parameters_that_are_given_are_believed(dataset):
