@@ -26,7 +26,6 @@ from opamc_cli.joint.name.settle import Named, lowering, only_named, settled, wo
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.signal.motion.smoothing import measurement_noise
 
-UNMISSED = "the sealed data do not miss it"
 RAISES = "the other effects, or functions without a name, explain as much without it"
 TWICE = 2.0
 """The open samples' error: sealed ones of 34 joints had 0.7 to 1.7 times it, one changed 2.6."""
@@ -173,42 +172,29 @@ def _closed(
             # One name that holds what they do, but for what nobody cares about, is the thing.
             holds = held >= (1 - LEAST_SHARE) * explained
             final = worth_their_price(beam(single, unnamed, width=1)) if holds else alone
-    searched = lowering(final)
-    final, unmissed = _confirmed(searched)
+    final = lowering(final)
     final, names = released(final), released(only_named(final))
     steps = _steps(start, final, named, shares, seed)
     kept = {id(term) for term in final.terms}
     told = [one.trial.told for one in named]
     told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
-    refused = [replace(t, why_not=UNMISSED) for t in told if any(t.term is u for u in unmissed)]
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    fits = before, names.fit, final.fit, best_before, *([searched.fit] if unmissed else ())
-    loop = _opened(fits, saturated, steps, refused, tried, library)
+    loop = _opened((before, names.fit, final.fit, best_before), saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
 
 
-def _confirmed(chain: Chain) -> tuple[Chain, list[Term]]:
-    """Take back the names that the sealed data do not miss beside all else, least missed first."""
-    back: list[Term] = []
-    while True:
-        named = [k for k, term in enumerate(chain.terms) if not term.effect.unnamed]
-        rest = {k: without(chain, k, rounds=1).fit.rmse(sealed=True) for k in named}
-        place = min(rest, key=rest.__getitem__, default=0)
-        least = (1 - PRICE) * rest.get(place, np.inf) ** 2
-        if chain.fit.rmse(sealed=True) ** 2 <= least:
-            return chain, back
-        back.append(chain.terms[place])
-        chain = without(chain, place)
-
-
 def _without_names(start: Chain, named: list[Named], unnamed: Pool) -> Chain:
-    """Explain by smooth functions alone, no lines, what several names hold that may all be none."""
+    """Explain by smooth functions alone what several names may hold that are all none.
+
+    By no lines, of which any motion that repeats is a sum, and by no shift or response in the place
+    of an effect that is one: it would be the same without its name.
+    """
     measuring = any(one.term.effect.as_smoothing for one in named)
     library = {
         name: one
         for name, one in unnamed.library.items()
-        if not (one.fast or (one.as_smoothing and measuring))  # or it would be it without its name
+        if not (one.fast or (one.as_smoothing and measuring))
     }
     return worth_their_price(beam(start, replace(unnamed, library=library), width=1))
 
@@ -256,30 +242,28 @@ def _steps(
 
 
 def _opened(
-    fits: tuple[Fit, ...],
+    fits: tuple[Fit, Fit, Fit, Fit],
     saturated: Sequence[Chain],
     steps: list[Step],
-    refused: list[Tried],
     tried: list[tuple[int, Tried]],
     library: Library,
 ) -> Loop:
-    before, named, after, best_before, *searched = fits
+    before, named, after, best_before = fits
     # What either explains can be explained.
     ceilings = [(ceiling(before, chain.fit), chain) for chain in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
-    # Nor is what was added to look better for names that were taken back by these very data.
-    least_after = max((fit.rmse(sealed=True) for fit in searched if steps), default=0.0)
-    rmse_named, rmse_after = (max(f.rmse(sealed=True), least_after) for f in (named, after))
+    rmse_named, rmse_after = named.rmse(sealed=True), after.rmse(sealed=True)
     # The declared model is not to look worse than where it was fitted best.
     least = min(before, best_before, key=lambda fit: fit.rmse(sealed=True))
     rmse_before = least.rmse(sealed=True)
     scale = (before.rmse(sealed=True) / max(rmse_before, 1e-300)) ** 2
     found = Ceiling(max(1.0 - scale * (1.0 - found.share), 0.0), scale * found.standard_error)
+    refused: list[Tried] = []
     if steps and rmse_after**2 > (1.0 - PRICE) * rmse_before**2:
-        # Functions without a name first, then all: no set of steps is sought that holds best there.
+        # Functions without a name first, then all: steps are never chosen among by the sealed data.
         hold = rmse_named**2 <= (1.0 - PRICE) * rmse_before**2
         why = "does not hold on the sealed data"
-        refused += [replace(one.trial, why_not=why) for one in steps if not (one.named and hold)]
+        refused = [replace(one.trial, why_not=why) for one in steps if not (one.named and hold)]
         steps = [one for one in steps if one.named and hold]
         after, rmse_named = (named, rmse_named) if hold else (before, rmse_before)
         rmse_after = rmse_named

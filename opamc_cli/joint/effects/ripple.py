@@ -178,7 +178,11 @@ class Ripple(Effect):
 
 
 def _answering(track: Track, parameters: Parameters) -> list[float]:
-    """Angular frequencies (rad/s) of the filters in which a drive's answer is expanded, falling."""
+    """Angular frequencies (rad/s) of the filters in which a drive's answer is expanded.
+
+    Evenly spread over the octaves, highest first: `answer`, so many per octave, from `top_hz` down;
+    if that is missing, from the ripple's own where the joint is as fast as it gets.
+    """
     density = parameters.get("answer", 0.0)
     if not density:
         return []

@@ -122,7 +122,11 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
 
 
 def _rivals_of(term: Term, unnamed: Pool) -> Pool:
-    """Return functions that may take a name: for a line none that looks at the acceleration."""
+    """Return the functions without a name that may stand in the place of an effect.
+
+    A line that shakes the joint is in the measured acceleration, too: what looks at that, or
+    filters it, is no rival.
+    """
     library = {
         name: one
         for name, one in unnamed.library.items()
@@ -135,8 +139,9 @@ def _rivals_of(term: Term, unnamed: Pool) -> Pool:
 def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> bool:
     """Whether a smooth function without a name stands in the place of an effect.
 
-    What a smooth function does as well is no line (another joint's motion is none), unless half of
-    it is left beside that. A name that holds nine tenths stays: the rest is asked for beside it.
+    Where a smooth function does as well as a line (another joint's motion is none), it is no line,
+    but for one that still takes half of it beside the function: that explains something else. A
+    name that holds nine tenths of what it explains stays: the rest is asked for beside it.
     """
     if term.effect.fast and term.effect.domain != "acceleration":
         difference, error = paired(rival.deviation, best.deviation)

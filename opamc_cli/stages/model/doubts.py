@@ -8,7 +8,8 @@ import numpy as np
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.loop import Loop
-from opamc_cli.joint.name.chain import HALF
+from opamc_cli.joint.name.chain import HALF, chain_of, without
+from opamc_cli.joint.name.search import LEAST_SHARE
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.stages.recordings.mistaken import scaled
 from opamc_cli.storage.runs.run import Run
@@ -66,6 +67,8 @@ CANCEL = (
 
 CANCELS = 3.0
 """Spreads of the current from which on what an effect adds is there to cancel another."""
+
+UNMISSED = "axis {}: the sealed data do not miss {}: a guess until another recording shows it, too"
 
 COPIES = (
     "axis {}: the motion repeats itself, and a cycle has {:.0f} samples that count, to which {} "
@@ -159,6 +162,8 @@ def doubts_of(
     orders = [step.term.parameters["order"] for step in loop.steps if _is_ripple(step.term)]
     if family := one_turn(orders):
         doubts.append(ONE_TURN.format(axis, ", ".join(f"{order:.4g}" for order in family)))
+    if unmissed := _unmissed(loop):
+        doubts.append(UNMISSED.format(axis, ", ".join(unmissed)))
     own, fitted = _of_a_cycle(loop)
     called = ", ".join(_called(step.term) for step in loop.steps if step.named)
     if called and own < COPIED * fitted:
@@ -245,6 +250,21 @@ def _begins_with(loop: Loop, names: Sequence[str]) -> str | None:
         if any(abs(since_s - start_s) < within_s for since_s in since):
             return name
     return None
+
+
+def _unmissed(loop: Loop) -> list[str]:
+    """Name the effects without which, beside all others, the sealed error is hardly larger.
+
+    By less than a share of its square that is asked of an effect in the open data.
+    """
+    squared, found = loop.rmse_after_a**2, []
+    closed = chain_of(loop.after, len(loop.steps))
+    for place, step in enumerate(loop.steps):
+        if step.named:
+            rest = without(closed, place, rounds=1).fit.rmse(sealed=True)
+            if squared > (1 - LEAST_SHARE) * rest**2:
+                found.append(_called(step.term))
+    return found
 
 
 def one_turn(orders: Sequence[float]) -> list[float]:

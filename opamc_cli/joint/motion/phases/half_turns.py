@@ -137,8 +137,10 @@ def _common_course(
 ) -> tuple[Floats, tuple[float, ...]] | None:
     """One cycle of a path that repeats, NaN where few cycles have current, and all gaps guessed.
 
-    From one stretch to the next it changes by what most cycles say; what is left was turned in the
-    gap in which cycles differ most, else in the longest. None if a tenth of the travel is left.
+    From one stretch of current to the next the angle changes by what most cycles say; of a whole
+    cycle nothing may be left: that was turned in the gap in which cycles differ most, if no two of
+    three agree there, else in the longest; where they do not in two gaps or more, these are all
+    guesses. None if more than a tenth of the travel is left and no cycles differ by as much.
     """
     cycles = path.size // period
     folded = path[: cycles * period].reshape(cycles, period)

@@ -73,7 +73,8 @@ class PhaseAngle:
 def _slope(angle: Floats, position: Floats, speed: Floats, rough: float) -> float:
     """Electrical radians per joint radian at which the angle, modulo pi, follows the position.
 
-    It slips by half turns. Of samples with enough current, (n,); `rough` is right to some per cent.
+    Where the torque passes zero within a stroke the followed angle slips by half turns, so that no
+    straight line fits it. Of samples with enough current, (n,); `rough` is right to a few per cent.
     """
     travel = float(np.ptp(position))
     largest = float(np.max(np.abs(speed), initial=0.0))
@@ -105,7 +106,10 @@ def _slope(angle: Floats, position: Floats, speed: Floats, rough: float) -> floa
 
 
 def _lag(rest: NDArray[np.complex128], speed: Floats, longest_s: float) -> float:
-    """Lag by which the phasors `rest` turn twice with the speed; the shortest of equals."""
+    """Lag that turns the phasors `rest` by twice the lag times the speed; the shortest of equals.
+
+    At one speed there and back, lags that differ by half a period look the same.
+    """
     step = 0.25 / max(float(np.quantile(np.abs(speed), 0.99)), 0.25 / longest_s)
     count = int(longest_s / step)
 

@@ -87,8 +87,9 @@ def _turned(
 ) -> tuple[float, Floats, bool]:
     """Turn one stretch after the other while its squared error falls below a share of what it was.
 
-    The strongest first by -1, what they ask of the weak is surer; by 0 in time. Also says how much
-    is explained, and whether friction resists: of two mirror images it does in one.
+    In order of their power, the strongest first by -1: what they ask of the weak is surer; by 0 in
+    time. Also says how much is explained, and whether friction resists: of two mirror images it
+    does in one.
     """
     signs = signs.copy()
     total = gram.sum(axis=0)
