@@ -88,6 +88,7 @@ def run(
     kept: KeptResults | None = None,
     figures_of_healthy: bool = True,
     worded: Callable[[str], str] = str,
+    nights_in_folders: bool = False,
 ) -> DiagnoseOutcome:
     """Compare target runs with baseline runs, joint by joint.
 
@@ -112,6 +113,8 @@ def run(
         than the diagnosis of a short recording.
     worded
         How a note is put where recordings lie elsewhere than their user knows.
+    nights_in_folders
+        Whether a folder whose name is a date is a night, whatever `started_at` says.
 
     Raises
     ------
@@ -121,7 +124,7 @@ def run(
     with result(out, *FILES) as staged:
         outcome = _diagnose(
             *(baseline, target, config, staged, models, jobs, progress, kept),
-            *(figures_of_healthy, worded),
+            *(figures_of_healthy, worded, nights_in_folders),
         )
     return replace(
         outcome,
@@ -142,6 +145,7 @@ def _diagnose(
     kept: KeptResults | None,
     figures_of_healthy: bool,
     worded: Callable[[str], str],
+    nights_in_folders: bool,
 ) -> DiagnoseOutcome:
     _check_before(baseline, target)
     if config.joint.library:
@@ -170,7 +174,7 @@ def _diagnose(
     )
     unjudged = agreement.unjudged(normal.motions, other.motions)
     progress("score")
-    starts_at = config.score.day_starts_at
+    starts_at = None if nights_in_folders else config.score.day_starts_at
     sides = Sides(read_side(normal.patterns), read_side(other.patterns), starts_at, kept)
     if {key[0] for key in sides.rows[0]} <= unjudged.axes.keys():
         unlike = other_conditions(sides.baseline.sources, sides.target.sources)
@@ -194,7 +198,10 @@ def _diagnose(
     sources = (*sides.baseline.sources, *sides.target.sources)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]
-    of_baseline = (*normal.errors, *unjudged.of_baseline, *decided.odd_ones())
+    of_baseline = (
+        *(*normal.errors, *unjudged.of_baseline),
+        *(*unjudged.sessions_without(sides), *decided.odd_ones()),
+    )
     of_target = (
         *(*repeats.errors, *other.errors, *unjudged.errors),
         *unjudged.sessions_at_rest(sides),

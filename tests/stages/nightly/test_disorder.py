@@ -294,8 +294,8 @@ def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, lo
     shutil.move(places[0, "second"], aside)
     assert to_do() == "0"
     first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
-    assert first.out.startswith("r1 of the baseline ")
-    assert f"{places[0, 'second'].name} is gone; what was judged" in first.out
+    assert first.out.startswith("r1 its baseline has lost ")
+    assert f"{places[0, 'second'].name}; what was judged stays" in first.out
     assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
     add_night(logs, 5)
     opamc("nightly", cell)

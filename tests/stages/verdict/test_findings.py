@@ -157,7 +157,7 @@ def test_what_all_currents_lose_or_gain_between_samples_is_no_joint_s(smooth, ti
     [
         (0.0, 0.5, "the current of axis 2 is 0.0% of the baseline's though its position moves"),
         (0.0, 0.0, "baseline's; the joint stands without load, or its sensor is dead"),
-        (1.0, 0.0, "no motion is found in x: axis 2 stands still there"),
+        (1.0, 0.0, "the position of axis 2 does not change though its current is 100%"),
     ],
 )
 def test_a_dead_sensor_is_no_joint_that_stands(current, position, said):
