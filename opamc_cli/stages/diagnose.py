@@ -11,6 +11,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcError
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.cycles.taught import taught_anew
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
@@ -19,7 +20,9 @@ from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.stages.verdict.decision import Decided, decide
-from opamc_cli.stages.verdict.wording.reasons import is_excused
+from opamc_cli.stages.verdict.state import DRY
+from opamc_cli.stages.verdict.wording.causes import of_taught_points, taught_points
+from opamc_cli.stages.verdict.wording.reasons import explains_little, is_excused
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
@@ -183,6 +186,12 @@ def _diagnose(
     decided = decide(sides, config)
     segments = (normal.segments, other.segments)
     causes, in_vain = _causes(decided, segments, config, kept, progress)
+    taught = taught_anew(normal.motions, other.motions)
+    for axis, cause in causes.items():
+        # the path that a model of the joint follows is the logged one, wherever that leads
+        resists = cause.get("effect") in DRY and not explains_little(cause)
+        if axis in taught and not resists:
+            causes[axis] = of_taught_points(taught[axis])
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,
@@ -190,6 +199,7 @@ def _diagnose(
         other.notes,
         scored.notes,
         decided.notes(),
+        [taught_points(taught)] if taught else [],
         in_vain,
         blind,
     )
