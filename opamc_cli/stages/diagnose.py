@@ -11,6 +11,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcError
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.cycles.taught import taught_anew
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
@@ -19,7 +20,9 @@ from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.stages.verdict.decision import Decided, decide
-from opamc_cli.stages.verdict.wording.reasons import is_excused
+from opamc_cli.stages.verdict.state import DRY
+from opamc_cli.stages.verdict.wording.causes import of_taught_points, taught_points
+from opamc_cli.stages.verdict.wording.reasons import explains_little, is_excused
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
@@ -88,6 +91,7 @@ def run(
     kept: KeptResults | None = None,
     figures_of_healthy: bool = True,
     worded: Callable[[str], str] = str,
+    nights_in_folders: bool = False,
 ) -> DiagnoseOutcome:
     """Compare target runs with baseline runs, joint by joint.
 
@@ -112,6 +116,8 @@ def run(
         than the diagnosis of a short recording.
     worded
         How a note is put where recordings lie elsewhere than their user knows.
+    nights_in_folders
+        Whether a folder whose name is a date is a night, whatever `started_at` says.
 
     Raises
     ------
@@ -121,7 +127,7 @@ def run(
     with result(out, *FILES) as staged:
         outcome = _diagnose(
             *(baseline, target, config, staged, models, jobs, progress, kept),
-            *(figures_of_healthy, worded),
+            *(figures_of_healthy, worded, nights_in_folders),
         )
     return replace(
         outcome,
@@ -142,6 +148,7 @@ def _diagnose(
     kept: KeptResults | None,
     figures_of_healthy: bool,
     worded: Callable[[str], str],
+    nights_in_folders: bool,
 ) -> DiagnoseOutcome:
     _check_before(baseline, target)
     if config.joint.library:
@@ -170,7 +177,7 @@ def _diagnose(
     )
     unjudged = agreement.unjudged(normal.motions, other.motions)
     progress("score")
-    starts_at = config.score.day_starts_at
+    starts_at = None if nights_in_folders else config.score.day_starts_at
     sides = Sides(read_side(normal.patterns), read_side(other.patterns), starts_at, kept)
     if {key[0] for key in sides.rows[0]} <= unjudged.axes.keys():
         unlike = other_conditions(sides.baseline.sources, sides.target.sources)
@@ -179,6 +186,12 @@ def _diagnose(
     decided = decide(sides, config)
     segments = (normal.segments, other.segments)
     causes, in_vain = _causes(decided, segments, config, kept, progress)
+    taught = taught_anew(normal.motions, other.motions)
+    for axis, cause in causes.items():
+        # the path that a model of the joint follows is the logged one, wherever that leads
+        resists = cause.get("effect") in DRY and not explains_little(cause)
+        if axis in taught and not resists:
+            causes[axis] = of_taught_points(taught[axis])
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,
@@ -186,6 +199,7 @@ def _diagnose(
         other.notes,
         scored.notes,
         decided.notes(),
+        [taught_points(taught)] if taught else [],
         in_vain,
         blind,
     )
@@ -194,7 +208,10 @@ def _diagnose(
     sources = (*sides.baseline.sources, *sides.target.sources)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]
-    of_baseline = (*normal.errors, *unjudged.of_baseline, *decided.odd_ones())
+    of_baseline = (
+        *(*normal.errors, *unjudged.of_baseline),
+        *(*unjudged.sessions_without(sides), *decided.odd_ones()),
+    )
     of_target = (
         *(*repeats.errors, *other.errors, *unjudged.errors),
         *unjudged.sessions_at_rest(sides),

@@ -165,6 +165,15 @@ def _beside(outcome: Any) -> dict[str, list[str]]:
 
 def _print_plan(output: Output, outcome: Any) -> None:
     todo = [night for night in outcome.planned.values() if night.why]
+    n_done = len(outcome.planned) - len(todo)
+    with_nights = {night.robot for night in outcome.planned.values()}
+    empty = [robot for robot in outcome.robots if robot not in with_nights]
+    odd = (
+        *outcome.absent,
+        *([] if outcome.absent else [f"{robot}: no recording" for robot in empty]),
+        *(f"{stray.robot} {stray.text}" for stray in outcome.strays),
+        *(one.text for one in outcome.unnamed),
+    )
     output.result(
         {
             "nights": [
@@ -177,18 +186,18 @@ def _print_plan(output: Output, outcome: Any) -> None:
                 }
                 for night in todo
             ],
-            "done": len(outcome.planned) - len(todo),
+            "done": n_done,
             **_beside(outcome),
         },
-        *outcome.absent,
-        *(f"{stray.robot} {stray.text}" for stray in outcome.strays),
-        *(one.text for one in outcome.unnamed),
+        *odd,
         *(
             f"{night.robot} {night.night}: {night.why}"
             + (", part of the baseline" if night.in_baseline else "")
             for night in todo
         ),
-        f"{len(todo)} nights to be done, {len(outcome.planned) - len(todo)} are done",
+        f"{len(todo)} night{'s' * (len(todo) != 1)} to be done, {n_done} "
+        f"{'is' if n_done == 1 else 'are'} done",
+        urgent=bool(odd),
     )
 
 

@@ -44,6 +44,7 @@ from opamc_cli.stages.chain.cycles.reference import (
     own_references,
     with_carrier,
 )
+from opamc_cli.stages.chain.cycles.taught import PLACES, displacements
 from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import (
@@ -192,7 +193,8 @@ def run(
         },
         inputs=inputs,
         extra=sources_record(list(sources.values()), out)
-        | {OTHER_SPEEDS: other_speeds, TWO_SPEEDS: sorted({run for run, _ in midway})},
+        | {OTHER_SPEEDS: other_speeds, TWO_SPEEDS: sorted({run for run, _ in midway})}
+        | {PLACES: displacements(motions, parts, references)},
     )
     notes = (*_unlike(motions, rule), *elsewhere)
     return IdentifyOutcome(path, motions, errors, notes, other_speeds)

@@ -1,6 +1,6 @@
 """What is said in the morning: who needs a look, and nothing to those who need none."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
@@ -152,7 +152,8 @@ def tell(
     if len(standing_lines) > MOST_STANDING:
         more = f"and {len(standing_lines) - MOST_STANDING} more, see {out / files.PAGE}"
         standing_lines[MOST_STANDING:] = [more]
-    lines += _of_events(news, cell)
+    n_joints = {one.name: len({joint.axis for joint in one.joints}) for one in summary.robots}
+    lines += _of_events(news, cell, n_joints)
     alarms = any(robot.alarms for robot in summary.robots)
     unwatched = any(robot.unwatched for robot in summary.robots)
     # nothing stays of these
@@ -195,7 +196,7 @@ def _of_robots(
     return lines, standing_lines
 
 
-def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
+def _of_events(news: Sequence[Event], cell: Path, n_joints: Mapping[str, int]) -> list[str]:
     """Say what is a line of its own, of all robots of which it is true at once."""
     said: dict[tuple[int, str], list[str]] = {}
     at_once: dict[str, dict[str, None]] = {}
@@ -204,7 +205,12 @@ def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
             at_once.setdefault(event.time, {})[event.robot] = None
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
         if event.kind in OVER:
-            text = event.text + _exchanged(event, at_once.get(event.time, ()))
+            alike = [
+                robot
+                for robot in at_once.get(event.time, ())
+                if n_joints.get(robot) == n_joints.get(event.robot)
+            ]
+            text = event.text + _exchanged(event, alike)
             robots = said.setdefault((OVER[event.kind], text), [])
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing

@@ -1,6 +1,6 @@
 """What follows from the history: alarms, what is worth saying, old folders, pages and metrics."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from opamc_cli import __version__
@@ -24,7 +24,13 @@ OF_NIGHT = frozenset({files.VERDICT, files.REPORT})
 
 
 def settle_cell(
-    cell: CellConfig, source: str, history: History, robots: Sequence[str], *, whole: bool = False
+    cell: CellConfig,
+    source: str,
+    history: History,
+    robots: Sequence[str],
+    *,
+    whole: bool = False,
+    may_begin: Callable[[str, str], bool] = lambda robot, night: False,
 ) -> Summary:
     """Bring everything that follows from the nights up to date.
 
@@ -40,6 +46,8 @@ def settle_cell(
         Those that were looked at.
     whole
         Whether all nights of all robots were: only then a night that is not known is missing.
+    may_begin
+        Whether a robot may record of a night yet.
 
     Returns
     -------
@@ -62,7 +70,7 @@ def settle_cell(
         own = {*robots, *(by_robot if cell.robots == "auto" else ())}
         left = [one for one in history.events() if one.kind == "missing" and one.robot not in own]
         nights = {robot: by_robot.get(robot, []) for robot in own}
-        history.replace_missing([*left, *missing(nights, gone, cell.alarm.remind_after)])
+        history.replace_missing([*left, *missing(nights, gone, cell.alarm.remind_after, may_begin)])
     _prune(cell, history)
     named = None if cell.robots == "auto" else tuple(cell.robots)
     by_first_nights = cell.baseline.nights is not None

@@ -34,7 +34,7 @@ class Sessions:
 
 
 def sessions_of(
-    sources: "Sequence[RunSource]", day_starts_at_h: float, by_folder: bool = False
+    sources: "Sequence[RunSource]", day_starts_at_h: float | None, by_folder: bool = False
 ) -> Sessions:
     """Group recordings into sessions.
 
@@ -43,7 +43,8 @@ def sessions_of(
     sources
         Recordings of one side.
     day_starts_at_h
-        Hour of the day, UTC, at which one night ends and the next begins.
+        Hour of the day, UTC, at which one night ends and the next begins; None: a folder whose
+        name is a date is a night, whatever `started_at` says.
     by_folder
         Whether the folders of recordings without session and time tell them apart; see
         `lie_in_folders`.
@@ -58,8 +59,9 @@ def sessions_of(
     told: dict[str, tuple[str, str]] = {}
     wrong_clocks = 0
     for source in sources:
-        night = night_of(source.info.started_at, day_starts_at_h)
         named = _date_of(source.path.parent.name)
+        by_clock = day_starts_at_h is not None or named is None
+        night = night_of(source.info.started_at, day_starts_at_h or 0.0) if by_clock else named
         if source.info.session is not None:
             told[source.name] = (BY_SESSION, source.info.session)
         elif night and named and abs((night - named).days) > 1:

@@ -12,7 +12,7 @@ from opamc_cli.joint.change.search import SCALE
 from opamc_cli.joint.change.slow import FRICTION_SPREAD
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.stages.verdict.wording.causes import ANY_FRICTION, meaning
-from opamc_cli.stages.verdict.wording.reasons import OF_SENSORS, is_suspect, logged
+from opamc_cli.stages.verdict.wording.reasons import OF_SENSORS, TAUGHT, is_suspect, logged
 
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
@@ -177,10 +177,11 @@ def believed(
     Noise or hum that is there at rest has no course: where that has changed, the spectrum must know
     noise far better; a line of the mains is told by its frequency. Grease,
     payload and offsets act slowly: they do not excuse what the spectrum alone has found. Nor does
-    grease, where it did move the course, what the spectrum shows far more clearly.
+    grease, where it did move the course, what the spectrum shows far more clearly. Of points that
+    were taught anew all moves.
     """
     noise = cause is not None and not OF_SENSORS.isdisjoint(cause.get("evidence", ()))
-    if cause is None or not (noise or cause.get("harmless")):
+    if cause is None or not (noise or cause.get("harmless")) or cause["effect"] == TAUGHT:
         return cause
     heard = judgement.witnesses
     course_p, spectrum_p = heard.get("profile", 0.0), heard.get("spectrum", 1.0)

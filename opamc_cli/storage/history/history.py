@@ -6,6 +6,7 @@ there or it is not. Nothing in the file depends on the order in which nights wer
 the clock, but the times at which a user acknowledged or declared something.
 """
 
+import json
 import os
 import sqlite3
 from collections import Counter
@@ -284,6 +285,12 @@ class History:
                 "EXISTS (SELECT * FROM night WHERE robot = ? AND night = ? AND ? NOT IN ('', why))",
                 (night.robot, *place, *place, night.why),
             )
+            if self._begins_anew(night):  # an alarm that it raises is another one, and is news
+                of = "WHERE robot = ? AND substr(time, 1, 10) = ? AND kind"
+                self._db.execute(f"DELETE FROM told {of} = 'reminder'", place)
+                self._db.execute(
+                    f"UPDATE OR REPLACE told SET kind = 'known' {of} = 'stands'", place
+                )
             for table in ("verdict", "measure"):
                 self._db.execute(f"DELETE FROM {table} WHERE robot = ? AND night = ?", place)
             self._put("night", [night])
@@ -296,6 +303,18 @@ class History:
             for of_key in news.values():
                 self._put_news(of_key, replaces=of_key[0].time == night.night)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (night.robot,))
+
+    def _begins_anew(self, night: NightRow) -> bool:
+        """Whether a night was judged by other nights before a user began a new baseline."""
+        place, members = (night.robot, night.night), json.loads(night.key).get("members")
+        return bool(
+            self.rows(
+                "SELECT key FROM night n JOIN declared d USING (robot) WHERE robot = ? AND "
+                "n.night = ? AND d.kind = 'rebaselined' AND d.night <= n.night AND "
+                "json_extract(key, '$.members') IS NOT ? LIMIT 1",
+                (*place, members),
+            )
+        )
 
     def _put_news(self, events: Sequence[Event], *, replaces: bool) -> None:
         """Keep events of one key; it is news if one of them is."""
@@ -440,13 +459,6 @@ class History:
                     "UPDATE OR REPLACE told SET kind = 'known' "
                     "WHERE (robot, axis, kind) = (?, ?, 'stands')",
                     (said.robot, said.axis),
-                )
-            if said.kind == "rebaselined":  # what its nights say from now on is news
-                of = "WHERE robot = ? AND time >= ? AND kind"
-                place = (said.robot, said.night)
-                self._db.execute(f"DELETE FROM told {of} = 'reminder'", place)
-                self._db.execute(
-                    f"UPDATE OR REPLACE told SET kind = 'known' {of} = 'stands'", place
                 )
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (said.robot,))
 

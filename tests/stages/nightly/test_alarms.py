@@ -55,7 +55,8 @@ def test_a_joint_that_was_judged_again_is_not_said_to_be_unjudged_since():
     assert said(lost, judged) == ["axis 2: not judged 2026-03-01: no motion"]
     (told,) = said(judged, lost, lost, lost)
     assert told.endswith(
-        "no motion; if that is meant to stay: opamc nightly rebaseline ROBOT --from 2026-03-02 "
+        "no motion; if that is meant to stay, and the joint was looked at: "
+        "opamc nightly rebaseline ROBOT --from 2026-03-02 "
         "--why TEXT --cell CELL"
     )
     assert said(lost, lost, judged, lost) == [

@@ -227,7 +227,10 @@ def test_a_key_that_metadata_had_not_is_named_with_the_condition_that_it_makes(c
 @pytest.mark.long
 @pytest.mark.usefixtures("here", "undrawn")
 def test_a_history_that_is_lost_is_said_with_what_its_results_tell(cell, opamc):
-    why = "alarms of before are not known\n"
+    why = (
+        "alarms of before are not known, nor what was acknowledged and which baselines were begun "
+        "anew: put history.sqlite back from a copy, or declare that again\n"
+    )
     nightly = cell.parent / "nightly"
     assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
     (nightly / "r1" / night(4) / "verdict.json").write_text("half a")

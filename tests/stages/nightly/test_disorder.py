@@ -294,8 +294,8 @@ def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, lo
     shutil.move(places[0, "second"], aside)
     assert to_do() == "0"
     first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
-    assert first.out.startswith("r1 of the baseline ")
-    assert f"{places[0, 'second'].name} is gone; what was judged" in first.out
+    assert first.out.startswith("r1 its baseline has lost ")
+    assert f"{places[0, 'second'].name}; what was judged stays" in first.out
     assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
     add_night(logs, 5)
     opamc("nightly", cell)
@@ -610,3 +610,25 @@ def test_a_robot_without_files_whose_clock_is_a_year_off_is_told_so():
     assert ("2026-03-11", "no file of 2026-03-11; others have some") in said
     # and one that has no other night is no reason to give up
     assert lacks([-355])[0][1].startswith("no file of 2026-03-01")
+
+
+@pytest.mark.usefixtures("here", "undrawn")
+def test_an_old_alarm_is_not_told_again_before_its_nights_are_the_new_baseline_s(cell, opamc):
+    """A mail about a gear that was exchanged, from a start that took none of its nights."""
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+    opamc("nightly", "rebaseline", "r2", "--from", night(3), "--why", "gear", "--cell", cell)
+    for _ in range(2):
+        elsewhere = opamc("nightly", cell, "--quiet", "--night", night(1))
+        assert (elsewhere.code, elsewhere.out) == (ExitCode.UNHEALTHY, "")
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.out == f"r2 axis 2: the alarm of {night(3)} is over, by a new baseline\n"
+    assert ended.code == ExitCode.DONE
+
+
+@pytest.mark.usefixtures("here", "undrawn")
+def test_a_dry_run_says_what_is_odd_though_it_is_quiet(cell, opamc):
+    assert opamc("nightly", cell, "--dry-run", "--quiet").out == ""
+    cell.write_text(cell.read_text() + "robots: {r1: {}, r9: {}}\n")
+    said = opamc("nightly", cell, "--dry-run", "--quiet").out
+    assert "r9: no recording\n" in said
+    assert "r2 not named by the cell's file" in said

@@ -416,7 +416,8 @@ def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc
         "the baseline has changed",
         "1 new or changed file",
     }
-    opamc("nightly", cell, "--quiet")
+    said = "r1 its baseline, now of 4 recordings: one is new or has changed; 2 nights judged anew"
+    assert said in opamc("nightly", cell, "--quiet").out
     new = {path for path in (cell.parent / "nightly" / ".kept").rglob("*") if path.is_file()} - kept
     # two axes of the one file, three stages and its places; its channels, and what tells it from a
     # copy; of the whole baseline its tables, and how far its cycles scatter

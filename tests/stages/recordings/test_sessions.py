@@ -75,6 +75,21 @@ def test_a_clock_that_was_never_set_does_not_make_one_session_of_dated_folders()
     assert len(sessions_of(near, 12.0, lie_in_folders(near))) == 1
 
 
+def test_a_folder_of_a_date_is_a_night_where_folders_tell_nights():
+    """A day shift, 06:30 to 16:00, was two nights, the first of the day before."""
+    runs = [
+        source(f"{day[:10]}/{k}.parquet", started_at=f"{day}:00Z")
+        for k, day in enumerate(("2026-03-01T06:30", "2026-03-01T16:00", "2026-03-02T06:30"))
+    ]
+    assert sorted({*sessions_of(runs, 12.0).of_run.values()}) == ["2026-02-28", "2026-03-01"]
+    found = sessions_of(runs, None)
+    assert [*found.of_run.values()] == ["2026-03-01", "2026-03-01", "2026-03-02"]
+    assert found.told_by == ("night",)
+    # but what is called a session is one
+    other = source("a/1.parquet", session="s", started_at="2026-03-01T22:00:00Z")
+    assert sessions_of([other], None).told_by == ("session",)
+
+
 def test_a_start_that_is_no_time_is_said():
     runs = [source(f"{k}.parquet", started_at="0001-01-01") for k in range(3)]
     found = sessions_of(runs, 12.0)

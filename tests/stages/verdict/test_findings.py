@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from opamc_cli.stages.recordings.sessions import Sessions
 from opamc_cli.stages.verdict.agreement.findings import (
     _all_filtered,
     _all_scaled,
@@ -15,6 +16,7 @@ from opamc_cli.stages.verdict.agreement.findings import (
     _still,
 )
 from opamc_cli.stages.verdict.agreement.measured import _changing, _noise, _steps
+from opamc_cli.stages.verdict.agreement.unjudged import Unjudged
 
 
 @pytest.mark.parametrize(
@@ -157,7 +159,7 @@ def test_what_all_currents_lose_or_gain_between_samples_is_no_joint_s(smooth, ti
     [
         (0.0, 0.5, "the current of axis 2 is 0.0% of the baseline's though its position moves"),
         (0.0, 0.0, "baseline's; the joint stands without load, or its sensor is dead"),
-        (1.0, 0.0, "no motion is found in x: axis 2 stands still there"),
+        (1.0, 0.0, "the position of axis 2 does not change though its current is 100%"),
     ],
 )
 def test_a_dead_sensor_is_no_joint_that_stands(current, position, said):
@@ -186,3 +188,19 @@ def test_degrees_for_radians_are_no_joint_that_stands_still(current, position, s
     told = _far_too_large(own, usual)
     assert (told is None) == (said is None)
     assert said is None or told.startswith(said)
+
+
+def test_a_session_of_the_baseline_without_a_joint_is_said():
+    """Five recordings of one of six nights had no second joint, and nothing said so."""
+    nights = {f"{n}/{k}": f"2026-03-0{n}" for n in (1, 2, 3) for k in "ab"}
+    sides = SimpleNamespace(sessions=(Sessions(nights, ("night",)),))
+
+    def said(*runs):
+        found = Unjudged({}, (), unrecorded={2: {*runs}}).sessions_without(sides)
+        return [(str(one), one.axes) for one in found]
+
+    assert said("1/a") == said() == []  # the other half of the night has it
+    assert said("2/a", "2/b") == [
+        ("night 2026-03-02 of the baseline has no current of axis 2", (2,))
+    ]
+    assert said("1/a", "1/b", "2/a", "2/b") == []  # most lack it: it is rarely logged

@@ -85,8 +85,8 @@ class Sides:
     baseline: Side
     target: Side
     """With `baseline`: tables of either side."""
-    day_starts_at_h: float = 12.0
-    """Hour of the day, UTC, at which a night ends."""
+    day_starts_at_h: float | None = 12.0
+    """Hour of the day, UTC, at which a night ends; None: the folders tell nights."""
     kept: KeptResults | None = None
     """Where what the baseline alone tells may lie."""
     target_by_file: bool = False

@@ -1,7 +1,7 @@
 """Which robots have no file of nights of which others have."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date, timedelta
 from itertools import accumulate
 from operator import or_
@@ -22,8 +22,11 @@ def missing(
     by_robot: Mapping[str, Sequence[NightRow]],
     gone: Mapping[str, str],
     remind_after: int,
+    may_begin: Callable[[str, str], bool] = lambda robot, night: False,
 ) -> Iterator[Event]:
     """Say which robots have no file of nights of which others have, and again while they lack.
+
+    Of nights in which `may_begin` says that a robot may record yet nothing is said.
 
     A robot of which somebody has said that it is gone is not reminded of until it has files again;
     nor is it said of weekdays on which it rests, as long as it has files again after them.
@@ -38,9 +41,10 @@ def missing(
                 first, text = min(nights, default=""), f"no file at all; {HOW_TO_END}"
                 yield Event(first, robot, None, "missing", text)
             continue
-        lacking = {night for night in nights if night > min(own)} - own
+        watched = [n for n in nights if n > min(own) and (n in own or not may_begin(robot, n))]
+        lacking = {*watched} - own
         gap: list[str] = []
-        for night in [*(n for n in nights if n > min(own)), ""]:
+        for night in [*watched, ""]:
             if night in lacking:
                 gap.append(night)
             elif gap:

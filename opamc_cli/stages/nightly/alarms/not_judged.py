@@ -34,7 +34,8 @@ def not_judged(rows: Sequence[Mapping[str, Any]], remind_after: int) -> Iterator
             text = f"not judged {when}{row}: {_in_one(nights, reasons)}"
             if last is rows[-1] and len(streak) >= LASTS:
                 again = REBASELINE.replace("DATE", first["night"])
-                text = f"{text.removesuffix('.')}; if that is meant to stay: {again}"
+                looked = "if that is meant to stay, and the joint was looked at"
+                text = f"{text.removesuffix('.')}; {looked}: {again}"
             for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
 

@@ -105,7 +105,7 @@ def trend_phrase(
         grows = farther
         if trend.get("low", 0) > 0:
             grows = f"grows by {100 * trend['per_night']:.2g} points a night"
-        return f"beyond {level}, {grows}"
+        return f"{'' if reached else 'in most nights '}beyond {level}, {grows}"
     if reach is None:
         why = "the change too unevenly" if "level" in trend else "too few nights"
         unsure = f", {why} to say when it reaches {level}"

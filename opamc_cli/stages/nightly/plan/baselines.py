@@ -109,9 +109,8 @@ class Baselines:
 
     def said(self) -> tuple[tuple[str, str], ...]:
         """Return what is gone of baselines, each with a sentence; of one start they are one."""
-        is_gone = "is gone" if len(self._gone) == 1 else "are gone"
         text = (
-            f"of the baseline {some(sorted(self._gone.values()))} {is_gone}; what was judged "
+            f"its baseline has lost {some(sorted(self._gone.values()))}; what was judged "
             "stays, new nights are judged by the recordings that are left"
         )
         return (*self._thinned.values(), *((name, text) for name in sorted(self._gone)))

@@ -35,23 +35,31 @@ class Comparison:
 
     absent: tuple[str, ...] = ()
     """Other programs that each night of the baseline has, and this one has not."""
+    running: bool = False
+    """Whether more may be recorded in the night."""
 
     @property
     def lacking(self) -> Iterator[str]:
         """Say that the night has fewer recordings than each of the baseline's, if it has.
 
-        Of a baseline of one night, of nights that differ, or of recordings that a user has picked,
-        nobody knows how many there are to be.
+        Fewer by more than these differ among themselves. Of a baseline of one night, or of
+        recordings that a user has picked, nobody knows how many there are to be.
         """
+        if self.running:
+            return
         for program in self.absent:
             yield f"no recording of program {program!r} where each night of the baseline has one"
         nights = Counter(one.night for one in (*self.baseline, *self.gone))
-        usual, have = set(nights.values()), len(self.targets)
-        if self.picked or len(nights) < 2 or len(usual) > 1 or have >= min(usual):
+        have = len(self.targets)
+        if self.picked or len(nights) < 2:
+            return
+        least, most = min(nights.values()), max(nights.values())
+        if have >= least - (most - least):
             return
         recordings = "1 recording" if have == 1 else f"{have} recordings"
         program = f" of program {self.program!r}" * bool(self.program)
-        yield f"{recordings}{program} where each night of the baseline has {min(usual)}"
+        usual = f"{least}" if least == most else f"{least} to {most}"
+        yield f"{recordings}{program} where each night of the baseline has {usual}"
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,8 @@ class Situation:
     """Its alarms, by the night in which they were raised."""
     is_to_come: Callable[[str], bool] = bool
     """Whether this start will judge a night if it has to be."""
+    is_running: Callable[[str], bool] = lambda _: False
+    """Whether more may be recorded in a night."""
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,17 @@ from itertools import combinations
 from opamc_cli import __version__
 from opamc_cli.config.models import digest
 from opamc_cli.stages.nightly.inputs.recordings import Recording
-from opamc_cli.stages.nightly.plan.planned import Comparison
-from opamc_cli.storage.history.rows import NightRow
+from opamc_cli.stages.nightly.plan.planned import Comparison, PlannedNight
+from opamc_cli.storage.history.rows import UNJUDGED, NightRow
 
 MOST_ATTEMPTS = 3
 """Starts in which a night may break (time, memory, death of its worker) before it is left alone."""
 
 MOST_GONE = 6
 """Recordings of a baseline that are gone of which every choice is tried: 64."""
+
+BASELINE = "the baseline has changed"
+"""Why nights are judged anew that are held against others than before."""
 
 
 def key_of(
@@ -29,8 +32,10 @@ def key_of(
             # the same tuple for all nights of a baseline, alive as long as the plan is made
             known[id(one.baseline)] = sorted(each.identity for each in one.baseline)
     targets = [one.identity for each in comparisons for one in each.targets]
+    lacking = [said for one in comparisons for said in one.lacking]
     return json.dumps(
         {
+            **({"lacking": lacking} if lacking else {}),
             "version": __version__,
             "config": config_hash,
             "baseline": _baseline_digest(comparisons, known, ()),
@@ -92,8 +97,19 @@ def reason_of(
     lost = lost or then["baseline"] in earlier
     kept = lost and record.status != "failed" and now["members"] == then.get("members")
     if now["baseline"] != then["baseline"] and not kept:
-        return "the baseline has changed"
+        return BASELINE
     added = set(now["files"]) - set(then["files"])
     if added:
         return f"{len(added)} new or changed file{'s' if len(added) > 1 else ''}"
+    if now["files"] == then["files"] and now.get("lacking", []) > then.get("lacking", []):
+        return "the night is over, and has not all its recordings"
     return f"broke before ({record.why})" if again else ""
+
+
+def has_other_recordings(night: PlannedNight, record: NightRow | None) -> bool:
+    """Whether a night is judged anew since its baseline's nights have other recordings."""
+    compared = any(one.baseline for one in night.comparisons)
+    if record is None or record.status in UNJUDGED or night.why != BASELINE or not compared:
+        return False
+    now, then = json.loads(night.key), json.loads(record.key)
+    return bool(now["members"] == then.get("members"))

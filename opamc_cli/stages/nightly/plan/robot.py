@@ -56,7 +56,8 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         comparisons = []
         for program in sorted(programs_of.get(night, ())):
             condition, targets = series[program, night]
-            comparisons.append(baselines.comparison(program, condition, night, tuple(targets)))
+            compared = baselines.comparison(program, condition, night, tuple(targets))
+            comparisons.append(replace(compared, running=now.is_running(night)))
             left = [
                 one
                 for one in judged_of[night]

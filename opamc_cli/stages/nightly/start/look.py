@@ -1,9 +1,11 @@
 """Looks at what there is of a cell, in the light of what is known: what is to be done now."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 
 from opamc_cli.config.cell import CellConfig
+from opamc_cli.stages.nightly.inputs.hours import Hours, usual_hours
 from opamc_cli.stages.nightly.inputs.one_rate import at_named_rates, named_rates
 from opamc_cli.stages.nightly.inputs.recordings import (
     CellRecordings,
@@ -15,6 +17,7 @@ from opamc_cli.stages.nightly.inputs.recordings import (
 )
 from opamc_cli.stages.nightly.inputs.strangers import said_of_baselines, without_strangers
 from opamc_cli.stages.nightly.plan.planned import PlannedNight, RobotPlan, Situation
+from opamc_cli.stages.nightly.plan.reason import has_other_recordings
 from opamc_cli.stages.nightly.plan.robot import plan_robot
 from opamc_cli.stages.nightly.start.jobs import COPIES
 from opamc_cli.stages.nightly.start.lost import say_lost
@@ -34,6 +37,14 @@ class Scene:
     wanted: Wanted
     recordings: CellRecordings
     """All that are there, but those that may be another robot's."""
+    hours: Mapping[str, Hours]
+    """At which each robot usually records."""
+    now: datetime
+    """As the start began."""
+
+    def may_begin(self, robot: str, night: str) -> bool:
+        """Whether a robot may record of a night yet."""
+        return self.hours.get(robot, Hours()).may_begin(night, self.now)
 
 
 @dataclass
@@ -58,7 +69,8 @@ def arrive(
     found = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     past = Past(cell, history)
     own = without_strangers(found.by_robot, found.baseline_by_robot, found.beside, past.recorded)
-    scene = Scene(cell, source, wanted, replace(found, by_robot=own))
+    hours = {robot: usual_hours(recordings) for robot, recordings in own.items()}
+    scene = Scene(cell, source, wanted, replace(found, by_robot=own), hours, datetime.now(UTC))
     outcome = CellOutcome(robots=tuple(sorted(own)))
     outcome.strays = [
         Event(path, robot, None, "stray", said_of_strays([path])) for robot, path in found.strays
@@ -117,6 +129,10 @@ def look_at(
         if planned.several_conditions:
             look.several.add(robot)
         _keep_baselines(history, past, scene.recordings.by_robot[robot], robot, planned, outcome)
+        known = past.recorded.get(robot, {})
+        others = [n for n in planned.nights if has_other_recordings(n, known.get(n.night))]
+        if others and (robot, others[0].night, others[0].key) not in tried:
+            history.record_news(_of_other_recordings(robot, others))
         for night in planned.nights:
             place = (robot, night.night, night.key)
             if not scene.wanted.has(night.night) or place in tried:
@@ -128,6 +144,16 @@ def look_at(
                 (look.to_judge if compared else look.unjudged).append(night)
     look.to_judge.sort(key=lambda night: (night.night, night.robot), reverse=True)
     return look
+
+
+def _of_other_recordings(robot: str, nights: Sequence[PlannedNight]) -> Event:
+    """Say that nights are judged anew: who drops a file into an old folder moves all verdicts."""
+    held = {one.log.path for night in nights for each in night.comparisons for one in each.baseline}
+    of = nights[0].night if len(nights) == 1 else f"{len(nights)} nights"
+    text = (
+        f"its baseline, now of {len(held)} recordings: one is new or has changed; {of} judged anew"
+    )
+    return Event(nights[0].night, robot, None, "lacking", text)
 
 
 def plan_of(robot: str, scene: Scene, past: Past, done: set[tuple[str, str]] | None) -> RobotPlan:
@@ -153,6 +179,7 @@ def plan_of(robot: str, scene: Scene, past: Past, done: set[tuple[str, str]] | N
         is_to_come=lambda night: (
             done is not None and scene.wanted.has(night) and (robot, night) not in done
         ),
+        is_running=lambda night: scene.hours[robot].may_go_on(night, scene.now),
     )
     return plan_robot(robot, at_named_rates(own, rates), situation)
 

@@ -29,7 +29,11 @@ def say_lost(cell: CellConfig, history: History) -> None:
     faulty = [f"{robot} {night}" for night, robot, path in reversed(found) if _has_fault(path)]
     with_fault = f"{len(faulty)} with a fault: {some(faulty)}" if faulty else "none with a fault"
     nights = "1 earlier night" if len(found) == 1 else f"{len(found)} earlier nights"
-    text = f"no history here, but results of {nights}, {with_fault}; alarms of before are not known"
+    text = f"no history here, but results of {nights}, {with_fault}; "
+    text += (
+        "alarms of before are not known, nor what was acknowledged and which baselines were begun "
+        f"anew: put {files.HISTORY} back from a copy, or declare that again"
+    )
     history.record_news(Event(found[-1][0], THE_CELL, None, "lost", text))
 
 

@@ -88,7 +88,12 @@ def run(
         _judge(looked.to_judge, scene, past, history, outcome, jobs, scheduler, progress)
         progress("alarms and pages")
         outcome.summary = settle_cell(
-            cell, source, history, outcome.robots, whole=wanted == Wanted()
+            cell,
+            source,
+            history,
+            outcome.robots,
+            whole=wanted == Wanted(),
+            may_begin=scene.may_begin,
         )
         robots = _to_look_at_again(looked, past, history)
         if not robots or outcome.ended:

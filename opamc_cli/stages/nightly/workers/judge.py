@@ -98,6 +98,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
                 kept=kept,
                 figures_of_healthy=False,
                 worded=lambda note: _plain(note, folder),
+                nights_in_folders=True,
             )
             if kept is not None:
                 look_ahead(wanted.baseline, folder / "out", job.config, kept)

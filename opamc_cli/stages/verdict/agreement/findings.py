@@ -333,6 +333,12 @@ def _still(own: Measured, reference: Reference) -> str:
         if own.size.get("position", 0.0) > DEAD_SHARE * moved:
             return f"{text} though its position moves: the sensor is dead, or its cable loose"
         return f"{text}; the joint stands without load, or its sensor is dead"
+    if own.size.get("position", math.inf) <= DEAD_SHARE * moved:
+        return (
+            f"the position of axis {own.axis} does not change though its current is "
+            f"{own.size['current'] / usual:.0%} of the baseline's: the encoder is dead, its "
+            "channel stuck, or the joint blocked"
+        )
     return f"no motion is found in {', '.join(own.signal)}: axis {own.axis} stands still there"
 
 

@@ -20,6 +20,7 @@ from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
 from opamc_cli.stages.verdict.evidence import session_names
 from opamc_cli.stages.verdict.wording.brief import with_shaken
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 MUCH_SHORTER = 0.5
 """Of the baseline's shortest recording: what lasts less may hold no whole cycle, and that is said
@@ -69,8 +70,27 @@ class Unjudged:
     """The same of the baseline's runs: the target is judged by the others."""
     at_rest: Mapping[int, Mapping[str, InputError]] = field(default_factory=dict)
     """By axis and run of the target, why it has none, which is usual where axes move in turn."""
+    unrecorded: Mapping[int, Collection[str]] = field(default_factory=dict)
+    """By axis that other runs have, runs of the baseline that have no current of it."""
     foreign: frozenset[int] = frozenset()
     """Axes whose target is of another program or log, by motions that fit nothing or its sign."""
+
+    def sessions_without(self, sides: Sides) -> list[InputError]:
+        """Return one for each axis of which the baseline's sessions, but few, have a current."""
+        told = sides.sessions[0]
+        found = []
+        for axis, runs in self.unrecorded.items():
+            has = {session for run, session in told.of_run.items() if run not in runs}
+            lacking = sorted({*told.of_run.values()} - has)
+            if 0 < len(lacking) < len(has):
+                of = ", ".join(told.named(session) for session in lacking)
+                verb = "has" if len(lacking) == 1 else "have"
+                found.append(
+                    InputError(
+                        f"{of} of the baseline {verb} no current of axis {axis}", axes=[axis]
+                    )
+                )
+        return found
 
     def sessions_at_rest(self, sides: Sides) -> list[InputError]:
         """Return one for each axis that rests in all of a target session, if in no other.
@@ -96,11 +116,14 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
     n_lost: Counter[Path] = Counter()
     at_rest: dict[int, dict[str, InputError]] = {}
     foreign: set[int] = set()
+    unrecorded: dict[int, set[str]] = {}
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
         for side in (target, baseline):
             lost = _lost(axis, side, baseline)
             idle = _idle(axis, side)
             paths = {own.run: own.path for own in side.measured}
+            if side is baseline:
+                unrecorded[axis] = {*paths} - {o.run for o in side.measured if o.axis == axis}
             n_lost.update(paths[run] for run in lost)
             if paths.keys() <= lost.keys() | idle.keys():
                 whys = {_but_numbers(why): why for why in (lost or idle).values()}
@@ -131,7 +154,7 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
         error = InputError(f"{path}: {_ended(why)}{left_out * (not others)}", axes=lacking)
         of_side.setdefault(roles[path], []).append(error)
     errors, of_baseline = (tuple(of_side.get(side.role, ())) for side in (target, baseline))
-    return Unjudged(axes, errors, of_baseline, at_rest, frozenset(foreign))
+    return Unjudged(axes, errors, of_baseline, at_rest, unrecorded, frozenset(foreign))
 
 
 def _but_numbers(why: str) -> str:
@@ -202,9 +225,18 @@ def _lost(axis: int, side: Side, baseline: Side) -> dict[str, str]:
         elif pc.max(rows["cycle"]).as_py() < 0:
             ratio = side.slowness.get(measured.run)
             lost[measured.run] = (
-                _unfitting(axis, rows, baseline) if ratio is None else of_another_speed(ratio)
+                _unfitting(axis, rows, baseline, _fitting_beside(axis, measured.run, side))
+                if ratio is None
+                else of_another_speed(ratio)
             )
     return lost
+
+
+def _fitting_beside(axis: int, run: str, side: Side) -> list[int]:
+    """Return the other axes whose cycles are found in a run."""
+    of_run = side.motions.filter(pc.equal(side.motions["run"], run))
+    fitting = of_run.filter(pc.greater_equal(of_run["cycle"], 0))["axis"]
+    return sorted(set(fitting.to_pylist()) - {axis})
 
 
 def _of_sensors(axis: int, side: Side) -> set[str]:
@@ -225,7 +257,7 @@ def _idle(axis: int, side: Side) -> dict[str, str]:
     return idle
 
 
-def _unfitting(axis: int, rows: pa.Table, baseline: Side) -> str:
+def _unfitting(axis: int, rows: pa.Table, baseline: Side, beside: Sequence[int]) -> str:
     usual = _shortest(axis, baseline)
     count = f"all {rows.num_rows} segments" if rows.num_rows > 1 else "the only segment"
     unknown = f"{count} of axis {axis} fit no motion of the baseline's cycle"
@@ -248,6 +280,12 @@ def _unfitting(axis: int, rows: pa.Table, baseline: Side) -> str:
             f"{unknown}: each of its cycles has {what}; all others fit. Only if the program was "
             "changed on purpose, record a new baseline; else look at the joint, a gross fault "
             "breaks motions up"
+        )
+    if beside:  # neither is the program another, nor its speed
+        return (
+            f"{unknown}, though those of {axes_phrase(beside)} do: look at the joint, a gross "
+            "fault changes the motion itself; else another joint's channels, or this joint's "
+            "motions alone were edited"
         )
     return (
         f"{unknown}: another program or speed, another joint's channels, no cycle that repeats, or "

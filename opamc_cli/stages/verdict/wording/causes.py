@@ -16,10 +16,12 @@ from opamc_cli.stages.verdict.wording.reasons import (
     IN_SPIKES,
     IN_THE_SUM,
     SENSOR_NOISE,
+    TAUGHT,
     effect_in_words,
     excuses_little,
     lies_outside,
 )
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 OF_OTHERS = ("effect", "parameters", "share", "interpretation", "origin")
 
@@ -147,6 +149,42 @@ def of_spikes(grown: ErrorGrowth) -> dict[str, Any]:
     )
     evidence = {IN_SPIKES: min(grown.times, MOST_TIMES)}
     return _sensor(grown.kind, OF_SPIKES, grown.share, evidence, why)
+
+
+def of_taught_points(away_rad: float) -> dict[str, Any]:
+    """Return points that were taught anew as a cause: it is another path, whatever the joint is."""
+    return {
+        "effect": TAUGHT,
+        "domain": "joint-angle",
+        "parameters": {},
+        "interpretation": (
+            f"points of the program that were taught anew, up to {1e3 * away_rad:.2g} mrad away: "
+            "of this path no baseline is there; record one"
+        ),
+        "share": 1.0,
+        "p_value": None,
+        "ties": [],
+        "harmless": True,
+        "origin": "load",
+        "explained": 1.0,
+        "clear": True,
+        "evidence": {"displaced_rad": away_rad},
+        "why": [
+            f"By the logged position its motions begin and end up to {1e3 * away_rad:.2g} mrad "
+            "from where those of the baseline do, and so do those of other joints; no fault moves "
+            "them all."
+        ],
+        "others": [],
+    }
+
+
+def taught_points(away_rad: Mapping[int, float]) -> str:
+    """Say that the points of a program were taught anew; by joint, how far away."""
+    return (
+        f"the program's points were taught anew: {axes_phrase(sorted(away_rad))} lead up to "
+        f"{1e3 * max(away_rad.values()):.2g} mrad elsewhere than in the baseline; a fault that "
+        "another path hides would not be told: record a new baseline"
+    )
 
 
 def _sensor(

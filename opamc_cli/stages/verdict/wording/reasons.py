@@ -50,6 +50,9 @@ which it is said to be worth an eye."""
 LEAST_SAID = 0.01
 """Change of all of a current that is told: 0 % beside a place that fell to a seventh is absurd."""
 
+TAUGHT = "taught_points"
+"""What another path is called that the program leads along: no effect of a joint is it either."""
+
 SENSOR_NOISE = "sensor_noise"
 """What a cause is called that no effect of a joint is: it is there while the joint stands still."""
 
